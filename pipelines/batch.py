@@ -35,8 +35,8 @@ from pipelines.io.output import (
     PROVENANCE,
     environment_faults,
     hash_file,
-    keep_apart,
     provenance_of,
+    refuse_place,
     renamed,
     staging_folder,
     sweep,
@@ -120,7 +120,7 @@ def run_batch(plan: Plan, tell: Callable[[str], None] = lambda words: None) -> O
     """
     root, out, wanted = plan.root.absolute(), plan.out.absolute(), plan.out
     items, checks = find_items(root, plan.each_log)
-    keep_apart(out, (), (root,))
+    refuse_place(out, (), (root,))
     plan = replace(plan, root=root, out=out)
     claim(out, plan.stage, plan.request.force)
     number, of = plan.shard

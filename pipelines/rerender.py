@@ -21,9 +21,9 @@ from pipelines.io.output import (
     PROVENANCE,
     environment_faults,
     hash_file,
-    keep_apart,
     listed_outputs,
     refuse_foreign,
+    refuse_place,
     remove_folder,
     staging_folder,
     tilde,
@@ -63,7 +63,7 @@ def rerender(folder: Path, out: Path | None = None, force: bool = False) -> Repo
     home = stored.path.parent
     is_batch = stored.command == "batch"
     if out is not None:
-        keep_apart(out, (stored.path,), (home,))
+        refuse_place(out, (stored.path,), (home,))
         refuse_foreign(out, force)
         if written_by(out) not in ("", "report") and not force:
             words = f"holds the result of '{written_by(out)}'"

@@ -31,9 +31,8 @@ from pipelines.io.output import (
     environment_faults,
     given_names,
     hash_file,
-    keep_apart,
     refuse_foreign,
-    refuse_unwritable,
+    refuse_place,
     remove_folder,
     renamed,
     replace_folder,
@@ -182,8 +181,7 @@ def default_out(inputs: Inputs, command: str) -> Path:
 def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     started = time.time()
     if request.out is not None:
-        keep_apart(request.out, (), request.paths)
-        refuse_unwritable(request.out)
+        refuse_place(request.out, (), request.paths)
         refuse_foreign(request.out, request.force, stage.remakes, stage.name)
     described = {} if request.robot is None else _hashes(robot_sources(request.robot), {})
     inputs = stage.read(request, settings)
@@ -210,8 +208,7 @@ def _outcome(
     started: float,
 ) -> Outcome[R]:
     out = request.out or default_out(inputs, stage.name)
-    keep_apart(out, (*inputs.sources, *described), (*request.paths, *inputs.folders))
-    refuse_unwritable(out)
+    refuse_place(out, (*inputs.sources, *described), (*request.paths, *inputs.folders))
     changed = refuse_foreign(out, request.force, stage.remakes, stage.name)
     hashes = _hashes(inputs.sources, inputs.hashes) | described
     # equal inputs give equal bytes in any place: no path of this machine goes into a result

@@ -25,11 +25,8 @@ class TextConfig:
     """Bounds of a TOML text: its parser may need time and memory far beyond the length."""
 
     size: int = 4 << 20  # [B] a description with the URDF of a thousand links has 0.4 MB
-    lines: int = 20_000  # outside multi-line texts; 5,000 files of a recipe
+    bare: int = 1 << 20  # characters outside of texts and comments: 5,000 files of a recipe
     parts: int = 6  # names in a dotted key; a configuration has two
-    key: int = 1000  # characters of a key or a bare value
-    depth: int = 32  # arrays and inline tables in each other
-    values: int = 200_000  # a transmission of 100 joints has 10,000
 
 
 @dataclass(frozen=True)

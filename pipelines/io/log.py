@@ -13,133 +13,50 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.errors import InputRejected, UsageError, did_you_mean
 from pipelines.io import schema
 from pipelines.io.robot import RobotDescription, format_robot, parse_robot
 from pipelines.io.sandbox import Answer
+from pipelines.io.schema import PER_JOINT, Array, Bitwise, Controller, Derived, LogAttributes
 
-Array = npt.NDArray[np.float64]
+__all__ = ["Array", "Controller", "Derived", "ExperimentLog", "Signal"]
 
-PER_JOINT = ("kp", "kd", "ki", "observer_gain", "output_limit", "torque_resolution")
 _DERIVING = ("reconstruct", "estimate-bps", "validate-writing", "diagnose", "extend")
 
 
-def frozen(values: npt.ArrayLike) -> Array:
-    """Return `values` as a read-only array of float64."""
-    array = np.asarray(values, dtype=np.float64)
-    if array.flags.writeable:
-        array = array.view()
-        array.flags.writeable = False
-    return array
-
-
-def _same(a: object, b: object) -> bool:
-    """Return whether two values are equal, arrays bit for bit."""
-    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
-        return a.shape == b.shape and a.tobytes() == b.tobytes()
-    if isinstance(a, Mapping) and isinstance(b, Mapping):
-        return a.keys() == b.keys() and all(_same(a[key], b[key]) for key in a)
-    return type(a) is type(b) and a == b
-
-
-class _Bitwise:
-    """Equality of dataclasses that hold arrays; fields that are not compared do not count."""
-
-    def __eq__(self, other: object) -> bool:
-        fields = self.__dataclass_fields__  # type: ignore[attr-defined]
-        names = [name for name, one in fields.items() if one.compare]
-        return type(self) is type(other) and all(
-            _same(getattr(self, name), getattr(other, name)) for name in names
-        )
-
-    __hash__ = None  # type: ignore[assignment]
-
-
 @dataclass(frozen=True, eq=False)
-class Signal(_Bitwise):
+class Signal(Bitwise):
     """Samples with their unit and their name in words."""
 
     values: Array  # (samples,) or (samples, joints)
     units: str
     long_name: str
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "values", frozen(self.values))
-
 
 @dataclass(frozen=True, eq=False)
-class Controller(_Bitwise):
-    """The controller of a log. `None`: the log does not say, and it is not guessed."""
-
-    law: str
-    kp: Array | None = None  # (n,) [N m/rad]; "computed-torque": [1/s^2]
-    kd: Array | None = None  # (n,) [N m s/rad]; "computed-torque": [1/s]
-    ki: Array | None = None  # (n,)
-    feedforward: tuple[str, ...] | None = None
-    velocity: str | None = None
-    observer_gain: Array | None = None  # (n, 3), k_i of eq. (20)
-    output_limit: Array | None = None  # (n,) [N m]
-    torque_resolution: Array | None = None  # (n,) [N m]
-    delay: int | None = None  # samples between q[k] and the tau it leads to
-    model: str | None = None  # text of the model.json that feed-forward used
-
-    def __post_init__(self) -> None:
-        for key in PER_JOINT:
-            if (value := getattr(self, key)) is not None:
-                object.__setattr__(self, key, frozen(value))
-        if self.feedforward is not None:
-            object.__setattr__(self, "feedforward", tuple(self.feedforward))
-
-
-@dataclass(frozen=True)
-class Derived:
-    """Where the samples of a derived log come from."""
-
-    command: str
-    settings: str  # JSON
-    source_sha256: str
-    created: str  # ISO 8601, UTC
-
-
-@dataclass(frozen=True, eq=False)
-class ExperimentLog(_Bitwise):
+class ExperimentLog(LogAttributes):
     """One experiment on one robot (log-format.md), everything in SI.
 
     `signals` always holds t and, but in planned logs, q and tau. Samples may be NaN: a recording
     is shown as it is, and `pipelines.quality.checks` says what is wrong with it.
     """
 
-    name: str
-    experiment: str
-    role: str
-    origin: str
-    robot_name: str
-    sample_time: float  # [s] nominal
-    robot_text: str
-    signals: Mapping[str, Signal]
-    torque: str | None = None
-    recorded: str | None = None
-    joint: int | None = None  # 1-based
-    posture: Array | None = None  # (n,) [rad]
-    period: float | None = None  # [s]
+    robot_text: str  # type: ignore[misc]  # what may be missing is given by name
+    signals: Mapping[str, Signal]  # type: ignore[misc]
     controller: Controller | None = None
     derived: Derived | None = None
     source: str = field(default="", compare=False)  # the file it was read from; no part of the log
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         # one order: equal logs make equal files
-        order = {name: place for place, name in enumerate((*schema.SIGNALS, *schema.DERIVED))}
-        names = sorted(self.signals, key=lambda name: (order.get(name, len(order)), name))
-        signals = {name: self.signals[name] for name in names}
+        order = [*schema.SIGNALS, *schema.DERIVED, *sorted(self.signals)]
+        signals = {name: self.signals[name] for name in sorted(self.signals, key=order.index)}
         object.__setattr__(self, "signals", MappingProxyType(signals))
-        if self.posture is not None:
-            object.__setattr__(self, "posture", frozen(self.posture))
 
     def __reduce__(self) -> tuple[object, ...]:
-        values = {key: getattr(self, key) for key in self.__dataclass_fields__}
-        return _rebuild, (values | {"signals": dict(self.signals)},)
+        return _rebuild, ({**vars(self), "signals": dict(self.signals)},)
 
     def __getitem__(self, name: str) -> Array:
         """Return the samples of signal `name`; KeyError where the log has none."""
@@ -185,7 +102,7 @@ class ExperimentLog(_Bitwise):
 
 
 def _rebuild(values: dict[str, Any]) -> ExperimentLog:
-    return ExperimentLog(**values)
+    return ExperimentLog(**{one.name: values[one.name] for one in fields(ExperimentLog)})
 
 
 def attributes_of(log: ExperimentLog) -> dict[str, dict[str, Any]]:
@@ -232,15 +149,14 @@ def assembled(parts: Answer, where: str) -> ExperimentLog:
         InputRejected: something is missing (S01), not in the format (S19), or wrong (S20).
     """
     groups = dict(parts.about["groups"])
-    values = schema.checked("attributes", groups.pop("attributes"), where)
+    values = vars(schema.checked("attributes", groups.pop("attributes"), where))
     robot = groups.pop("robot", None)
     if not isinstance(robot, str):
         words = "the robot description is missing"
         raise InputRejected("S01", words, where, "a log explains itself: write /robot")
-    for name, kind in (("controller", Controller), ("derived", Derived)):
+    for name in ("controller", "derived"):
         if name in groups:
-            found = schema.checked(name, groups.pop(name), f"{where}, {name}")
-            values[name] = kind(**found)
+            values |= {name: schema.checked(name, groups.pop(name), f"{where}, {name}")}
     if groups:
         words = f"{sorted(groups)} are not in format version {schema.FORMAT_VERSION}"
         raise InputRejected("S19", words, where, "remove them")

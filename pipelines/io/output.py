@@ -27,8 +27,15 @@ from pipelines.errors import EnvironmentFault, RrridError, UsageError, clean
 
 PROVENANCE = "provenance.json"
 _MARK = ".rrrid-tmp-"
+_OLD = "-of-"  # between the name of a draft and that of the folder whose place it takes
 _ELSEWHERE = "choose another folder with --out"
 _RESERVED = re.compile(r"(CON|PRN|AUX|NUL|COM[1-9]|LPT[1-9])(\..*)?", re.IGNORECASE)
+_FULL = ("no space left on the disk", "free space and run again")
+_FAULTS = {
+    errno.ENOSPC: _FULL,
+    errno.EDQUOT: _FULL,
+    errno.EFBIG: ("larger than this process may write", "raise its limit (ulimit -f)"),
+}
 
 
 @contextlib.contextmanager
@@ -55,15 +62,16 @@ def fault_of(problem: OSError, path: Path) -> RrridError:
     if problem.errno in (errno.ENAMETOOLONG, errno.ELOOP):
         return UsageError("C07", "not a path of this system", where, "check the path")
     if problem.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
-        remedy = "choose another --out, or change its permissions"
-        return EnvironmentFault("F13", "permission denied", where, remedy)
-    words, remedy = "cannot be read or written: ", "check the disk and the path"
-    words += os.strerror(problem.errno) if problem.errno else str(problem)
-    if problem.errno == errno.EFBIG:
-        words, remedy = "larger than this process may write", "raise its limit (ulimit -f)"
-    if problem.errno in (errno.ENOSPC, errno.EDQUOT):
-        words, remedy = "no space left on the disk", "free space and run again"
+        return _denied(where)
+    reason = os.strerror(problem.errno) if problem.errno else str(problem)
+    other = (f"cannot be read or written: {reason}", "check the disk and the path")
+    words, remedy = _FAULTS.get(problem.errno or 0, other)
     return EnvironmentFault("P02", words, where, remedy)
+
+
+def _denied(where: object) -> EnvironmentFault:
+    remedy = "choose another --out, or change its permissions"
+    return EnvironmentFault("F13", "permission denied", where, remedy)
 
 
 def hash_file(path: Path) -> str:
@@ -81,10 +89,9 @@ def write_file(path: Path, fill: Callable[[Path], object]) -> None:
         EnvironmentFault: disk full, no permission; the old file is untouched.
     """
     with environment_faults(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        sweep(path.parent)
+        place = staging_place(path)
+        draft = place.with_name(f"{place.name}{path.suffix}")  # writers look at the ending
         staged = any(part.startswith(_MARK) for part in path.parts[:-1])
-        draft = path.parent / f"{_draft_name()}{path.suffix}"  # writers look at the ending
         try:
             fill(draft)
             if not staged:
@@ -107,7 +114,7 @@ def staging_place(target: Path) -> Path:
     with environment_faults(target):
         target.parent.mkdir(parents=True, exist_ok=True)
         sweep(target.parent)
-        return target.parent / _draft_name()
+        return target.parent / f"{_machine()}{os.getpid()}-{os.urandom(4).hex()}"
 
 
 def staging_folder(target: Path) -> Path:
@@ -160,15 +167,8 @@ def replace_folder(staging: Path, target: Path) -> None:
         _sync(target.parent)
 
 
-_OLD = "-of-"  # between the name of a draft and that of the folder whose place it takes
-
-
-def _draft_name() -> str:
-    """Return a new hidden name: of the machine, which can ask its processes alone, and process."""
-    return f"{_machine()}{os.getpid()}-{os.urandom(4).hex()}"
-
-
 def _machine() -> str:
+    """Return how hidden names begin: with the machine, which can ask its processes alone."""
     return f"{_MARK}{zlib.crc32(platform.node().encode()):08x}-"
 
 
@@ -191,12 +191,10 @@ def sweep(folder: Path) -> None:
 def _alive(process: int) -> bool:
     try:
         os.kill(process, 0)
+        # Linux: a dead process whose parent has not waited for it still has its number
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except ProcessLookupError:
         return False
-    except PermissionError:
-        return True
-    try:  # Linux: a dead process whose parent has not waited for it still has its number
-        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except (OSError, IndexError):
         return True
 
@@ -212,29 +210,30 @@ def _sync(path: Path) -> None:
         os.close(handle)
 
 
-def keep_apart(out: Path, sources: Iterable[Path], folders: Iterable[Path]) -> None:
-    """Refuse an `out` that holds one of the `sources`, or lies inside an input folder (C05)."""
+def refuse_place(out: Path, sources: Iterable[Path], folders: Iterable[Path]) -> None:
+    """Refuse an `out` that holds one of the `sources`, lies in an input folder or cannot be made.
+
+    Raises:
+        UsageError: C05. EnvironmentFault: F13, no permission.
+    """
     target = out.resolve()
     for source in sources:
         # a link in `out` would be deleted as well
         linked = Path(os.path.abspath(source)).is_relative_to(os.path.abspath(out))
         if linked or source.resolve().is_relative_to(target):
-            words = f"holds the input {source}, and would be replaced with it"
-            raise UsageError("C05", words, out, _ELSEWHERE)
+            raise _refused(out, f"holds the input {source}, and would be replaced with it")
     for folder in folders:
         if os.path.isdir(folder) and target.is_relative_to(folder.resolve()):
-            raise UsageError("C05", f"lies inside the input {folder}", out, _ELSEWHERE)
+            raise _refused(out, f"lies inside the input {folder}")
+    above = next(path for path in out.absolute().parents if path.exists())
+    if not above.is_dir():
+        raise _refused(out, f"lies below {above}, which is not a folder")
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise _denied(above)
 
 
-def refuse_own_place(out: Path) -> None:
-    """Refuse the folder one is in, or around it: a shell would stay in the old one (C05)."""
-    try:
-        here = Path.cwd()
-    except FileNotFoundError:
-        return
-    if here.is_relative_to(out.resolve()):
-        words = "is the folder you are in, or around it, and would be replaced under you"
-        raise UsageError("C05", words, out, f"{_ELSEWHERE}, or call from outside of it (cd)")
+def _refused(out: Path, words: str, instead: str = "") -> UsageError:
+    return UsageError("C05", words, out, f"{_ELSEWHERE}{instead}")
 
 
 def refuse_foreign(
@@ -254,38 +253,28 @@ def refuse_foreign(
         The names of the files that are made again.
     """
     if out.is_symlink() or (out.exists() and not out.is_dir()):
-        raise UsageError("C05", "is not a folder", out, _ELSEWHERE)
-    refuse_own_place(out)
-    if not out.exists() or not any(out.iterdir()):
-        return ()
+        raise _refused(out, "is not a folder")
+    with contextlib.suppress(FileNotFoundError):
+        if Path.cwd().is_relative_to(out.resolve()):  # a shell would stay in the old one
+            words = "is the folder you are in, or around it, and would be replaced under you"
+            raise _refused(out, words, ", or call from outside of it (cd)")
     ours = listed_outputs(out)
-    if ours and force:
+    if not out.exists() or not any(out.iterdir()) or (ours and force):
         return ()
     known = {*ours, PROVENANCE} if ours else set()
-    foreign = list(islice((name for name in _members(out) if name not in known), 3))
-    if foreign:
+    if foreign := list(islice((name for name in _members(out) if name not in known), 3)):
         words = f"holds files that rrrid did not write there: {', '.join(foreign)}"
-        raise UsageError("C05", words, out, f"{_ELSEWHERE}, or move them")
+        raise _refused(out, words, ", or move them")
     if command and written_by(out) != command:
         words = f"holds the earlier result of {clean(written_by(out), 40)}"
-        raise UsageError("C05", words, out, f"{_ELSEWHERE}, or replace it with --force")
+        raise _refused(out, words, ", or replace it with --force")
     edited = [
         name for name in _members(out) if name in ours and hash_file(out / name) != ours[name]
     ]
     if kept := [name for name in edited if not remade(name)]:
         words = f"holds files that were changed since rrrid wrote them: {', '.join(kept[:3])}"
-        raise UsageError("C05", words, out, f"{_ELSEWHERE}, or replace them with --force")
+        raise _refused(out, words, ", or replace them with --force")
     return tuple(edited)
-
-
-def refuse_unwritable(out: Path) -> None:
-    """Refuse an `out` that cannot be made where it should be (F13, C05)."""
-    above = next(path for path in out.absolute().parents if path.exists())
-    if not above.is_dir():
-        raise UsageError("C05", f"lies below {above}, which is not a folder", out, _ELSEWHERE)
-    if not os.access(above, os.W_OK | os.X_OK):
-        remedy = "choose another --out, or change its permissions"
-        raise EnvironmentFault("F13", "permission denied", above, remedy)
 
 
 def _members(folder: Path, above: str = "") -> Iterator[str]:
@@ -338,11 +327,9 @@ def short_names(paths: Iterable[Path]) -> dict[str, str]:
         return {str(roots[0]): ""}
     names: dict[str, str] = {}
     for root in roots:
-        name, number = root.name, 1
-        while name and name in names.values():
-            number += 1
-            name = f"{root.name}-{number}"
-        names[str(root)] = name
+        numbered = (f"{root.name}-{number}" for number in range(2, len(roots) + 2))
+        free = (name for name in (root.name, *numbered) if not name or name not in names.values())
+        names[str(root)] = next(free)
     return names
 
 

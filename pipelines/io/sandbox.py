@@ -13,9 +13,9 @@ import contextlib
 import faulthandler
 import json
 import math
-import multiprocessing
 import os
 import re
+import select
 import signal
 import stat
 import sys
@@ -24,7 +24,6 @@ import tomllib
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
@@ -38,8 +37,9 @@ if TYPE_CHECKING:  # --help needs no NumPy
 
     Array = npt.NDArray[np.float64]
 
-T = TypeVar("T")
+Place = TypeVar("Place", bytearray, memoryview)
 
+_COUNT = 8  # numerics: [B] of the number that says how long a description is
 _AGAIN = "copy the file again"
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
 # An unterminated string reaches to the end of its line or of the text: one pass is enough.
@@ -122,21 +122,10 @@ def parse_toml(text: str) -> dict[str, Any]:
     bare = _STRING_OR_COMMENT.sub(
         lambda found: "" if found[0].startswith("#") else '""', text.replace("\r\n", "\n")
     )
-    pieces = re.split(r"[=\n,{}\[\]]", bare)
-    depth = deepest = 0
-    for bracket in re.findall(r"[\[\]{}]", bare):
-        depth += 1 if bracket in "[{" else -1
-        deepest = max(deepest, depth)
-    for found, bound, words in (
-        (len(text), TEXT.size, "characters"),
-        (bare.count("\n"), TEXT.lines, "lines"),
-        (len(pieces), TEXT.values, "values"),
-        (max(map(len, pieces)), TEXT.key, "characters in a key or a value"),
-        (max(piece.count(".") + 1 for piece in pieces), TEXT.parts, "parts of a key"),
-        (deepest, TEXT.depth, "arrays or tables in each other"),
-    ):
-        if found > bound:
-            raise TomlError(f"more than {bound} {words}")
+    if len(text) > TEXT.size or len(bare) > TEXT.bare:
+        raise TomlError(f"more than {TEXT.size} characters, or {TEXT.bare} outside of texts")
+    if any(piece.count(".") >= TEXT.parts for piece in re.split(r"[=\n,{}\[\]]", bare)):
+        raise TomlError(f"more than {TEXT.parts} parts of a key")
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as problem:
@@ -169,12 +158,12 @@ def guarded(
         memory = min(SANDBOX.memory + SANDBOX.memory_a_byte * size, SANDBOX.most_memory)
     longest = SANDBOX.description + SANDBOX.description_a_byte * size
     longest = min(longest, SANDBOX.most_description)
-    receiver, sender = multiprocessing.Pipe(duplex=False)
-    child = _fork(work, receiver, sender, seconds, memory)
-    sender.close()
+    reader, writer = os.pipe()
+    child = _fork(work, reader, writer, seconds, memory)
+    os.close(writer)
     ended, reason = False, "what came of reading it makes no sense"
     try:
-        return _received(receiver, time.monotonic() + seconds, longest, memory, path)
+        return _received(reader, path, longest, memory, seconds)
     except EOFError:
         ended, reason = True, "the reading library ended its process"
     except TimeoutError:
@@ -182,20 +171,14 @@ def guarded(
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         pass  # a child that the file has taken over
     finally:
-        receiver.close()
+        os.close(reader)
         crashed = _reaped(child, kill=not ended)
     if ended and crashed:
         reason = f"the reading library crashed on it (signal {crashed})"
     raise InputRejected("F03", f"{reason}, the file is damaged", path, _AGAIN)
 
 
-def _fork(
-    work: Callable[[], Answer],
-    receiver: Connection,
-    sender: Connection,
-    seconds: float,
-    memory: int,
-) -> int:
+def _fork(work: Callable[[], Answer], reader: int, writer: int, seconds: float, memory: int) -> int:
     """Return the process number of a child that does `work`."""
     # a signal between the fork and the child's own handlers would run the parent's program in it
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)
@@ -204,14 +187,14 @@ def _fork(
             warnings.simplefilter("ignore", DeprecationWarning)  # of a fork beside threads
             child = os.fork()
         if child == 0:
-            receiver.close()
-            _serve(work, sender, seconds, memory)
+            os.close(reader)
+            _serve(work, writer, seconds, memory)
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
     return child
 
 
-def _serve(work: Callable[[], Answer], sender: Connection, seconds: float, memory: int) -> NoReturn:
+def _serve(work: Callable[[], Answer], writer: int, seconds: float, memory: int) -> NoReturn:
     """Do the work in the child, send what it found, and leave without any clean-up."""
     try:
         # a signal for the whole group is the parent's to answer, and it ends this child
@@ -222,9 +205,12 @@ def _serve(work: Callable[[], Answer], sender: Connection, seconds: float, memor
         for stream in (0, 1, 2):  # HDF5 prints its error stack
             os.dup2(nowhere, stream)
         reply, arrays = _replied(work, seconds, memory)
-        sender.send_bytes(json.dumps(reply).encode())
-        for values in arrays:
-            sender.send_bytes(values.reshape(-1).data.cast("B"))
+        text = json.dumps(reply).encode()
+        with open(writer, "wb") as answer:
+            answer.write(len(text).to_bytes(_COUNT))
+            answer.write(text)
+            for values in arrays:
+                answer.write(values.reshape(-1).data.cast("B"))
     finally:
         os._exit(0)
 
@@ -278,57 +264,52 @@ def _limit(seconds: float, memory: int) -> bool:
     return lowered
 
 
-def _received(
-    receiver: Connection, deadline: float, longest: int, memory: int, path: Path
-) -> Answer:
+def _received(reader: int, path: Path, longest: int, memory: int, seconds: float) -> Answer:
     """Return what the child sends; raise what its work raised."""
     import numpy as np
 
-    try:
-        text = _next(receiver, deadline, lambda: receiver.recv_bytes(longest))
-    except TimeoutError:
-        raise
-    except OSError:
+    deadline = time.monotonic() + seconds
+    length = int.from_bytes(_read(reader, bytearray(_COUNT), deadline))
+    if length > longest:
         words = f"its description is longer than {longest / 1e6:.0f} MB"
-        remedy = "keep samples in signals, and texts short"
-        raise InputRejected("X05", words, path, remedy) from None
-    reply = json.loads(text)
+        raise InputRejected("X05", words, path, "keep samples in signals, and texts short")
+    reply = json.loads(_read(reader, bytearray(length), deadline))
     if "internal" in reply:
         raise RuntimeError(f"reading {path}: {reply['internal']}")
     if "error" in reply:
         raise _error(reply["error"], path)
-    shapes = reply["shapes"].values()
-    negative = any(size < 0 for shape in shapes for size in shape)
-    if negative or sum(8 * math.prod(shape) for shape in shapes) > memory:
+    shapes = reply["shapes"]
+    sizes = [8 * math.prod(shape) for shape in shapes.values()]
+    if sum(sizes) > memory or any(n < 0 for shape in shapes.values() for n in shape):
         raise ValueError("more samples than memory, or fewer than none")
     arrays = {}
-    for name, shape in reply["shapes"].items():
-        values = np.empty(shape)
-        if values.size:
-            place = values.reshape(-1).data.cast("B")
-            _next(receiver, deadline, lambda: receiver.recv_bytes_into(place))  # noqa: B023
+    for name, size in zip(shapes, sizes, strict=True):
+        values = np.empty(size // 8)
+        if size:
+            _read(reader, values.data.cast("B"), deadline)
         values.flags.writeable = False
-        arrays[name] = values
+        arrays[name] = values.reshape(shapes[name])
     return Answer(dict(reply["about"]), arrays)
 
 
-def _next(receiver: Connection, deadline: float, receive: Callable[[], T]) -> T:
-    """Return the next message; EOFError where the child ended before all of it was there."""
-    if not receiver.poll(max(0.0, deadline - time.monotonic())):
-        raise TimeoutError
-    try:
-        return receive()
-    except OSError as problem:
-        if "end of file" in str(problem):
-            raise EOFError from None
-        raise
+def _read(reader: int, place: Place, deadline: float) -> Place:
+    """Fill `place`; EOFError where the child ended before, TimeoutError at the deadline."""
+    poll, left = select.poll(), memoryview(place)
+    poll.register(reader)
+    while left:
+        if not poll.poll(1000.0 * max(0.0, deadline - time.monotonic())):
+            raise TimeoutError
+        count = os.readv(reader, [left])
+        if not count:
+            raise EOFError
+        left = left[count:]
+    return place
 
 
 def _error(error: Mapping[str, Any], path: Path) -> RrridError:
     kinds = {kind.exit_code: kind for kind in (UsageError, InputRejected, EnvironmentFault)}
     kind, code = kinds.get(error["exit"], InputRejected), error["code"].removeprefix("RRID-")
-    where = error["where"] or path
-    return kind(code, error["message"], where, error["remedy"])
+    return kind(code, error["message"], error["where"] or path, error["remedy"])
 
 
 def _reaped(child: int, *, kill: bool) -> int:

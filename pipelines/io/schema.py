@@ -1,7 +1,7 @@
 """Describe the experiment log as data: its attributes, signals, units and shapes (log-format.md).
 
-The dataclasses below hold the attributes of a file, as JSON has them. Their descriptions are the
-JSON Schema and the words of the errors; pydantic reads them when the first log is opened.
+The dataclasses below hold the attributes of a file. Their descriptions are the JSON Schema and the
+words of the errors; pydantic reads them when the first log is opened.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -34,6 +34,7 @@ Role = Literal["identify", "validate", "reference"]
 Origin = Literal["measured", "simulated", "planned"]
 TorqueKind = Literal["held-command", "measured"]
 Law = Literal["open-loop", "pd", "pd+feedforward", "computed-torque", "unknown"]
+Velocity = Literal["observer", "backward-difference"]
 Feedforward = Literal["friction", "inertia", "coriolis", "gravity"]
 
 EXPERIMENTS: tuple[str, ...] = get_args(Experiment)
@@ -91,7 +92,9 @@ _REVOLUTE = {
 _SLIDES = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2", "torque": "N"}
 _TEXT = r"^[^\x00]*$"
 _WORDS = r"^[^\x00]*[^\x00\s][^\x00]*$"
-_INSTANT = (
+_INSTANT = "ISO 8601 in UTC, like 2004-05-17T09:30:00Z"
+_SECONDS = "a positive number of seconds, a real number that a float can hold"
+_IN_UTC = (
     r"^\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])T([01]\d|2[0-3])(:[0-5]\d){2}"
     r"(\.\d+)?(Z|\+00:00)$"
 )
@@ -103,18 +106,14 @@ def described(words: str, default: Any = dataclasses.MISSING, **constraints: Any
     return dataclasses.field(default=default, metadata=about)
 
 
-def _instant(words: str, default: Any = dataclasses.MISSING) -> Any:
-    words = f"ISO 8601 in UTC, like 2004-05-17T09:30:00Z: {words}"
-    return described(words, default, pattern=_INSTANT)
-
-
-def _seconds(words: str, default: Any = dataclasses.MISSING) -> Any:
-    words = f"a positive number of seconds, a real number that a float can hold: {words}"
-    return described(words, default, ge=1e-12, le=1e12)
-
-
 def _words(words: str) -> Any:
     return described(f"a text in UTF-8 without NUL, not empty: {words}", pattern=_WORDS)
+
+
+def optional(words: str, **constraints: Any) -> Any:
+    """Return the same of a field that may be missing, which is given by its name alone."""
+    about = {"description": words, **constraints}
+    return dataclasses.field(default=None, kw_only=True, metadata=about)
 
 
 class Strict:
@@ -127,75 +126,122 @@ class Strict:
     }
 
 
+def frozen(values: npt.ArrayLike) -> Array:
+    """Return `values` as a read-only array of float64."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.flags.writeable:
+        array = array.view()
+        array.flags.writeable = False
+    return array
+
+
+class Bitwise:
+    """A dataclass whose arrays are read-only and equal bit for bit, as far as it is compared."""
+
+    def __post_init__(self) -> None:
+        for name in _ARRAYS:
+            if (value := getattr(self, name, None)) is not None:
+                object.__setattr__(self, name, frozen(value))
+
+    def __eq__(self, other: object) -> bool:
+        fields = self.__dataclass_fields__  # type: ignore[attr-defined]
+        names = [name for name, one in fields.items() if one.compare]
+        return type(self) is type(other) and all(
+            _same(getattr(self, name), getattr(other, name)) for name in names
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def _same(a: object, b: object) -> bool:
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return a.shape == b.shape and a.tobytes() == b.tobytes()
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
+        return a.keys() == b.keys() and all(_same(a[key], b[key]) for key in a)
+    return type(a) is type(b) and a == b
+
+
 @dataclass(frozen=True)
-class LogAttributes(Strict):
+class _ReadAs:
+    """Let pydantic read and describe a value as `kind`: an array as a list, a text as a choice."""
+
+    kind: Any
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        return handler.generate_schema(self.kind)
+
+
+Numbers = Annotated[Array, _ReadAs(list[float])]
+Rows = Annotated[Array, _ReadAs(list[list[float]])]
+Limits = Annotated[Array, _ReadAs(list[float | Literal["inf"]])]
+Names = Annotated[tuple[str, ...], _ReadAs(list[Feedforward])]
+PER_JOINT = ("kp", "kd", "ki", "observer_gain", "output_limit", "torque_resolution")
+_ARRAYS = (*PER_JOINT, "posture", "values")
+_LIST = "a list of finite numbers: "
+
+
+@dataclass(frozen=True, eq=False)
+class LogAttributes(Strict, Bitwise):
     """The attributes of a log."""
 
     name: str = _words("name, as results and reports have it")
-    experiment: Experiment = described("what was done")
-    role: Role = described("what it serves for")
-    origin: Origin = described("measured, simulated or planned")
+    experiment: Annotated[str, _ReadAs(Experiment)] = described("what was done")
+    role: Annotated[str, _ReadAs(Role)] = described("what it serves for")
+    origin: Annotated[str, _ReadAs(Origin)] = described("measured, simulated or planned")
     robot_name: str = _words("name of the robot")
-    sample_time: float = _seconds("nominal sampling period")
-    torque: TorqueKind | None = described("held-command, as commanded and held; or measured", None)
-    recorded: str | None = _instant("when it began", None)
-    joint: int | None = described(
-        "an integer: the one joint that moves, from 1", None, ge=1, le=1000
+    sample_time: float = described(f"{_SECONDS}: nominal sampling period", ge=1e-12, le=1e12)
+    torque: Annotated[str, _ReadAs(TorqueKind)] | None = optional(
+        "held-command, as commanded and held; or measured"
     )
-    posture: list[float] | None = described(
-        "a list of finite numbers: [rad, m] where the joints rest", None
-    )
-    period: float | None = _seconds("period of the motion", None)
+    recorded: str | None = optional(f"{_INSTANT}: when it began", pattern=_IN_UTC)
+    joint: int | None = optional("an integer: the one joint that moves, from 1", ge=1, le=1000)
+    posture: Numbers | None = optional(f"{_LIST}[rad, m] where the joints rest")
+    period: float | None = optional(f"{_SECONDS}: period of the motion", ge=1e-12, le=1e12)
 
 
-@dataclass(frozen=True)
-class ControllerAttributes(Strict):
-    """The controller that was in charge."""
+@dataclass(frozen=True, eq=False)
+class Controller(Strict, Bitwise):
+    """The controller of a log. `None`: the log does not say, and it is not guessed."""
 
-    law: Law = described("control law")
-    kp: list[float] | None = described(
-        "a list of finite numbers: [N m/rad] or [1/s^2] gain of position, joint by joint", None
+    law: Annotated[str, _ReadAs(Law)] = described("control law")
+    kp: Numbers | None = described(f"{_LIST}(n,) [N m/rad] or [1/s^2] gain of position", None)
+    kd: Numbers | None = described(f"{_LIST}(n,) [N m s/rad] or [1/s] gain of speed", None)
+    ki: Numbers | None = described(
+        f"{_LIST}(n,) [N m/(rad s)] or [1/s^3] gain of the integral", None
     )
-    kd: list[float] | None = described(
-        "a list of finite numbers: [N m s/rad] or [1/s] gain of speed, joint by joint", None
-    )
-    ki: list[float] | None = described(
-        "a list of finite numbers: [N m/(rad s)] or [1/s^3] gain of the integral", None
-    )
-    feedforward: list[Feedforward] | None = described("what is fed forward", None)
-    velocity: Literal["observer", "backward-difference"] | None = described(
+    feedforward: Names | None = described("what is fed forward", None)
+    velocity: Annotated[str, _ReadAs(Velocity)] | None = described(
         "what the derivative term uses", None
     )
-    observer_gain: list[list[float]] | None = described(
-        "a list of finite numbers: gains of the observer, one row a joint", None
+    observer_gain: Rows | None = described(f"{_LIST}(n, 3) k_i of eq. (20), one row a joint", None)
+    output_limit: Limits | None = described(
+        "a list of limits above 0: (n,) [N m] largest torque commanded", None
     )
-    output_limit: list[float | Literal["inf"]] | None = described(
-        "a list of limits above 0: [N m] largest torque commanded, joint by joint", None
+    torque_resolution: Numbers | None = described(f"{_LIST}(n,) [N m] step of the torque", None)
+    delay: Annotated[int, _ReadAs(Literal[0, 1])] | None = described(
+        "samples between q[k] and the tau it leads to", None
     )
-    torque_resolution: list[float] | None = described(
-        "a list of finite numbers: [N m] step of the commanded torque", None
-    )
-    delay: Literal[0, 1] | None = described("samples from measurement to command", None)
     model: str | None = described(
         "a text in UTF-8 without NUL: of the model.json that was fed forward", None, pattern=_TEXT
     )
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.feedforward is not None:
+            object.__setattr__(self, "feedforward", tuple(self.feedforward))
+
 
 @dataclass(frozen=True)
-class DerivedAttributes(Strict):
+class Derived(Strict):
     """Where the samples of a derived log come from."""
 
     command: str = _words("the command that has made it")
     settings: str = described("a JSON text: the settings of that command", pattern=_TEXT)
     source_sha256: str = _words("SHA-256 of the recording it was made of")
-    created: str = _instant("when it was made")
+    created: str = described(f"{_INSTANT}: when it was made", pattern=_IN_UTC)
 
 
-GROUPS: dict[str, Any] = {
-    "attributes": LogAttributes,
-    "controller": ControllerAttributes,
-    "derived": DerivedAttributes,
-}
+GROUPS: dict[str, Any] = {"attributes": LogAttributes, "controller": Controller, "derived": Derived}
 
 
 @cache
@@ -239,8 +285,8 @@ def plain(value: object) -> Any:
     return value
 
 
-def checked(group: str, found: object, where: str) -> dict[str, Any]:
-    """Return the values of a group of attributes, by their names.
+def checked(group: str, found: object, where: str) -> Any:
+    """Return a group of attributes as the dataclass of its name in `GROUPS`.
 
     Raises:
         InputRejected: an attribute is missing (S01), unknown (S19), or not what it should be (S20).
@@ -248,27 +294,26 @@ def checked(group: str, found: object, where: str) -> dict[str, Any]:
     from pydantic import ValidationError
 
     if not isinstance(found, Mapping):
-        words = "the attributes are missing"
-        raise InputRejected("S01", words, where, "write them, or import the recording again")
+        remedy = "write them, or import the recording again"
+        raise InputRejected("S01", "the attributes are missing", where, remedy)
     table = plain(found)
-    for name in ("joint", "delay"):  # programs that know only doubles (MATLAB) write 2.0
-        if isinstance(table.get(name), float) and table[name].is_integer():
-            table[name] = int(table[name])
     for name, value in table.items():
+        # programs that know only doubles (MATLAB) write 2.0
+        if name in ("joint", "delay") and isinstance(value, float) and value.is_integer():
+            table[name] = int(value)
         if isinstance(value, str) and any("\ud800" <= sign <= "\udfff" for sign in value):
             table[name] = "\0"  # no UTF-8: refused as that
     try:
         values = adapter(GROUPS[group]).validate_json(json.dumps(table))
         if group == "derived":
             json.loads(values.settings)
+        return values
     except ValidationError as problem:
         faults = problem.errors(include_url=False)
         raise _first_fault(faults, GROUPS[group], where) from None
     except (ValueError, RecursionError):
         words = "attribute 'settings' is not a JSON text"
         raise InputRejected("S20", words, where, "correct it") from None
-    names = (field.name for field in dataclasses.fields(values))
-    return {name: value for name in names if (value := getattr(values, name)) is not None}
 
 
 def _first_fault(faults: list[ErrorDetails], kind: type[Any], where: str) -> InputRejected:
@@ -276,7 +321,7 @@ def _first_fault(faults: list[ErrorDetails], kind: type[Any], where: str) -> Inp
     order = ("unexpected_keyword_argument", "missing", "missing_argument")
     fault = min(faults, key=lambda one: one["type"] not in order)
     name = str(fault["loc"][0])
-    if fault["type"] == "unexpected_keyword_argument":
+    if fault["type"] == order[0]:
         words = f"attribute '{name}' is not in format version {FORMAT_VERSION}"
         hint = did_you_mean(name, fields)
         return InputRejected("S19", f"{words}{hint}", where, "rename or remove it")

@@ -67,8 +67,8 @@ def _planned(arm: Arm, number: int, role: str, rng: np.random.Generator) -> Expe
     observer = np.tile(EXAMPLE.observer_gain, (arm.n_joints, 1))
     controller = Controller("pd", *gains, velocity="observer", observer_gain=observer)
     name, robot = f"excitation-{number + 1}", format_robot(arm.robot)
-    return ExperimentLog(name, "excitation", role, "planned", arm.robot.name, time, robot, signals,
-                         controller=controller)
+    return ExperimentLog(name, "excitation", role, "planned", arm.robot.name, time,
+                         robot_text=robot, signals=signals, controller=controller)
 
 
 def _series(rng: np.random.Generator) -> FourierSeries:
