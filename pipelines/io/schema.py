@@ -213,7 +213,7 @@ class Controller(Strict, Bitwise):
     velocity: Annotated[str, _ReadAs(Velocity)] | None = described(
         "what the derivative term uses", None
     )
-    observer_gain: Rows | None = described(f"{_LIST}(n, 3) k_i of eq. (20), one row a joint", None)
+    observer_gain: Rows | None = described(f"{_LIST}(n, 3) gains of the observer", None)
     output_limit: Limits | None = described(
         "a list of limits above 0: (n,) [N m] largest torque commanded", None
     )
