@@ -24,8 +24,8 @@ import numpy as np
 
 from benchmarks.frf_plants import KINDS, PLANTS, Session, recorded
 from benchmarks.hidden_effects.table import wilson
+from pipelines.frequency.config import GroupingConfig
 from pipelines.frequency.findings import Findings, frf_findings, grouped
-from pipelines.frequency.grouping import GroupingConfig
 from pipelines.io.files import open_log, write_log
 from pipelines.io.log import ExperimentLog
 

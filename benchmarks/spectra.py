@@ -27,13 +27,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy import signal
 
-from pipelines.frequency.frequency_response import closed_loop
+from pipelines.frequency.controller import double_integrator
 from pipelines.frequency.local_polynomial import local_polynomial
 from pipelines.frequency.multisine import multisine_responses
-from pipelines.frequency.rational import Mode
-from pipelines.frequency.rational_search import fit_rational
-from pipelines.frequency.spectra import cross_spectra, welch_responses
-from tests.frequency.loops import Plant, T, closed_loop_record
+from pipelines.frequency.rational import Mode, fit_rational
+from pipelines.frequency.spectra import closed_loop, cross_spectra
+from tests.frequency.loops import Plant, T, closed_loop_record, welch_responses
 
 RATE, SEGMENT = 1000, 4000
 
@@ -225,14 +224,9 @@ def modes(plants: int) -> str:
             else:
                 several = local_polynomial(stretches, RATE, np.arange(2.0, 200.0, 0.25))
             p = closed_loop(several).within(2.0, 200.0)
+            p = p.times(1.0 / double_integrator(p.frequency, T))
             fitted = fit_rational(
-                p.frequency,
-                p.response,
-                p.variance,
-                integrators=2,
-                hold=T,
-                correlated=p.correlated,
-                freedom=p.freedom,
+                p.frequency, p.response, p.variance, correlated=p.correlated, freedom=p.freedom
             )
             seconds += time.process_time() - start
             extra += max(len(fitted.modes()) - 4, 0)

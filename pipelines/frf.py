@@ -1,17 +1,18 @@
 """Measure frequency responses and classify compliance beside the rigid body.
 
-Reads    logs with experiment "frf": a joint turning slowly under an injected excitation v, with r (computed torque) or PD
+Reads    logs with experiment "frf": a joint turning slowly under an injected excitation v, with r
+         (computed torque) or PD
 Writes   result.json, result.h5 (every response), report.html
 Source   Kostić et al. 2004, Section IV.D, eq. (25)-(29), Fig. 17
 
-Responses are those of v to input and position: no disturbance in the loop biases their quotient, and no controller has to be
-known. The direct and the indirect method stand beside it. Base, joint, delay and rigid are told apart across postures.
+Responses are those of v to input and position: no disturbance in the loop biases their quotient,
+and no controller has to be known. The direct and the indirect method are compared with it. Base,
+joint, delay and rigid are distinguished across postures.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,21 +20,12 @@ import numpy as np
 
 from pipelines.dynamics.arm import Arm
 from pipelines.errors import Check, NothingMatched, UsageError
-from pipelines.frequency.findings import Findings, frf_findings
-from pipelines.frequency.grouping import GroupingConfig, advance
+from pipelines.frequency.config import GroupingConfig, SwingConfig
+from pipelines.frequency.findings import Findings, Seen, frf_findings
+from pipelines.frequency.grouping import Finding, Open, advance
 from pipelines.frequency.modes import BAND
 from pipelines.frequency.responses import How, Measured
-from pipelines.frequency.result import (
-    COHERENCE,
-    Classified,
-    Method,
-    Posture,
-    Undecided,
-    classified,
-    methods_of,
-    posture_of,
-    undecided,
-)
+from pipelines.frequency.result import COHERENCE, Method, Posture, methods_of, posture_of
 from pipelines.io.log import ExperimentLog, recording
 from pipelines.io.model_file import read_model
 from pipelines.io.option import option
@@ -44,24 +36,16 @@ from pipelines.stage import Inputs, Request, Stage, Uses, read_logs
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
-_RECORD = ("let one joint turn slowly there and back with v injected, in two postures or more; design-excitation --experiment frf "
-           "plans one, at home or where --home says")
-_UNFOLDED = "log all signals by one clock at the controller's own rate; or thin them out behind the same low-pass"
-
-
-@dataclass(frozen=True)
-class FrfConfig:
-    """Limits of warnings.
-
-    Attributes:
-        swing: of the turning speed, std of the speed that v makes; beyond it a normal swing turns friction's sign
-            (four deviations) in one sample of 30,000 or more often
-    """
-
-    swing: float = 0.25
-
-
-_CONFIG = FrfConfig()
+_RECORD = (
+    "let one joint turn slowly there and back with v injected, in two postures or more; "
+    "design-excitation --experiment frf plans one, at home or where --home says"
+)
+_UNFOLDED = (
+    "log all signals by one clock at the controller's own rate; or thin them out behind the same "
+    "low-pass"
+)
+_DRAWN = "Postures to draw, by their numbers: 1,3. [nearest to the two of Kostić et al. 2004]"
+_LOWEST = 0.1  # numerics: [Hz] slower than any arm
 
 
 @dataclass(frozen=True)
@@ -73,104 +57,109 @@ class Settings:
     low: float = option(BAND[0], "Modes are looked for from here [Hz].")
     high: float = option(BAND[1], "To here [Hz]. [250, or 0.3 of the rate]")
     model: str | None = option(None, "model.json whose inertia is expected. [the controller's own]")
-    postures: tuple[int, ...] = option((), "Postures to draw, by their numbers: 1,3. [nearest to the two of Kostić et al. 2004]", "--posture")
+    postures: tuple[int, ...] = option((), _DRAWN, "--posture")
 
 
 @dataclass(frozen=True)
 class Result:
-    """Every response, and what they say together."""
+    """Every response, and the classification of all."""
 
     robot: str
     responses: tuple[Method, ...]
     postures: tuple[Posture, ...]
-    classification: tuple[Classified, ...]
-    undecided: tuple[Undecided, ...]
+    classification: tuple[Finding, ...]
+    undecided: tuple[Open, ...]
     drawn: tuple[int, ...]
     data_quality: tuple[Check, ...]
 
 
 def read(request: Request, settings: Settings) -> Inputs:
-    """The logs, and the model where one is named."""
+    """Read the logs, and the model where one is named."""
     inputs = read_logs(request, settings)
     if settings.model is None:
         return inputs
     path = Path(settings.model).absolute()
-    sources = (path,) if path.is_file() else ()  # a shipped model is not one of the user's files
-    return replace(inputs, sources=(*inputs.sources, *sources), material=Arm.from_model(read_model(settings.model), path))
+    # a shipped model is not one of the user's files
+    sources = (*inputs.sources, path) if path.is_file() else inputs.sources
+    return replace(
+        inputs, sources=sources, material=Arm.from_model(read_model(settings.model), path)
+    )
 
 
 def compute(inputs: Inputs, settings: Settings) -> Result:
-    """Responses by three methods, modes, grouping.
+    """Estimate responses by three methods, their modes, and what bends.
 
     Raises:
         NothingMatched: C06, no frf log.
         UsageError: C02, settings that do not fit, or logs of several robots.
-        InputRejected: the doctor rejects a log, or no spectrum can be taken of it: S01, T05, T08, D09.
+        InputRejected: the doctor rejects a log, or no spectrum can be taken of it: S01, T05, T08,
+            D09.
     """
-    if not 0.1 <= settings.low < settings.high:
-        raise UsageError("C02", f"modes from {settings.low:g} to {settings.high:g} Hz", where="--low, --high",
-                         remedy="give two frequencies, the lower one first, from 0.1 Hz on")
+    band = (settings.low, settings.high)
+    if not _LOWEST <= settings.low < settings.high:
+        words = f"modes from {settings.low:g} to {settings.high:g} Hz"
+        remedy = "give two frequencies, the lower one first, from 0.1 Hz on"
+        raise UsageError("C02", words, where="--low, --high", remedy=remedy)
     _refuse_no_posture(settings, 0)
-    logs = _chosen(inputs)
-    arm = inputs.material if isinstance(inputs.material, Arm) and inputs.material.n_joints == logs[0].n_joints else None
+    logs, arm = _chosen(inputs), inputs.material
+    if not isinstance(arm, Arm) or arm.n_joints != logs[0].n_joints:
+        arm = None
     said = tuple(check for log in logs for check in accepted(Subject(log)))
-    found = frf_findings(logs, arm, How(settings.estimator, settings.resolution), (settings.low, settings.high))
-    postures = tuple(posture_of(seen) for seen in found.seen)
-    _refuse_no_posture(settings, max(Counter(posture.joint for posture in postures).values(), default=0))
-    return Result(logs[0].robot_name, tuple(m for seen in found.seen for m in methods_of(seen)), postures, classified(found),
-                  undecided(found), settings.postures, (*said, *_complaints(found, settings)))
+    found = frf_findings(logs, arm, How(settings.estimator, settings.resolution), band)
+    counts = Counter(seen.measured.joint for seen in found.seen)
+    _refuse_no_posture(settings, max(counts.values(), default=0))
+    return Result(
+        robot=logs[0].robot_name,
+        responses=tuple(m for seen in found.seen for m in methods_of(seen)),
+        postures=tuple(posture_of(seen) for seen in found.seen),
+        classification=found.classification,
+        undecided=found.undecided,
+        drawn=settings.postures,
+        data_quality=(*said, *_complaints(found, settings)),
+    )
 
 
 def _refuse_no_posture(settings: Settings, most: int) -> None:
-    """C02: a number that no posture can have, or none of the `most` that a joint was recorded in; 0: not known yet."""
-    if wrong := [number for number in settings.postures if number < 1 or 0 < most < number]:
-        there = "they are counted from 1" if not most else "give 1" if most == 1 else f"give 1 to {most}"
-        raise UsageError("C02", f"no joint has a posture {wrong[0]}", where="--posture",
-                         remedy=f"{there}, as numbered in the report under 'How it was measured'")
+    """C02: a number of no posture, of the `most` of a joint; 0: not known yet."""
+    wrong = [number for number in settings.postures if number < 1 or 0 < most < number]
+    if wrong:
+        there = {0: "they are counted from 1", 1: "give 1"}.get(most, f"give 1 to {most}")
+        remedy = f"{there}, as numbered in the report under 'How it was measured'"
+        words = f"no joint has a posture {wrong[0]}"
+        raise UsageError("C02", words, where="--posture", remedy=remedy)
 
 
 def _chosen(inputs: Inputs) -> list[ExperimentLog]:
-    """The "frf" logs that were measured; those of role "reference" only where there are no others."""
-    logs = [recording(o.log) for o in inputs.logs if o.log.experiment == "frf" and o.log.origin != "planned"]
+    """Return the "frf" logs that were measured; of role "reference" only without others."""
+    every = [opened.log for opened in inputs.logs]
+    logs = [recording(o) for o in every if o.experiment == "frf" and o.origin != "planned"]
     now = [log for log in logs if log.role != "reference"] or logs
     if not now:
-        kinds = ", ".join(sorted({o.log.experiment for o in inputs.logs})) or "none"
-        raise NothingMatched("C06", f"no frf log; there are: {kinds}", where=inputs.label, remedy=_RECORD)
+        kinds = ", ".join(sorted({o.experiment for o in every})) or "none"
+        words = f"no frf log; there are: {kinds}"
+        raise NothingMatched("C06", words, where=inputs.label, remedy=_RECORD)
     if len({log.robot_text for log in now}) > 1:
-        raise UsageError("C02", "logs of several robots", where=inputs.label,
-                         remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
+        remedy = "name the logs of one; 'rrrid run' takes a folder of several apart"
+        raise UsageError("C02", "logs of several robots", where=inputs.label, remedy=remedy)
     return now
 
 
 def _complaints(found: Findings, settings: Settings) -> list[Check]:
-    """D13, coherence too low; D09, friction that turns its sign."""
-    said = []
-    for one in found.unusable:
-        if one.aliased:
-            said.append(Check.of("T09", "warn", f"torque of joint {one.joint} was sampled, and v has power up to half the rate: "
-                                 "what is faster has folded back (aliasing), and no mode can be identified", where=_logs_of(one),
-                                 gate=True, remedy=_UNFOLDED))
-            continue
-        said.append(Check.of("D13", "warn", f"v tells nothing of joint {one.joint} from {settings.low:g} to {settings.high:g} Hz: "
-                             "no frequency can be relied on, no mode is looked for", where=_logs_of(one), gate=True,
-                             remedy="excite more strongly, record longer, or look for what disturbs the joint"))
+    """T09, T06, what has folded back; D13, coherence too low; D09, friction that turns its sign."""
+    said = [_unusable(one, settings) for one in found.unusable]
     for joint in sorted({seen.measured.joint for seen in found.seen}):
-        own = [seen for seen in found.seen if seen.measured.joint == joint]
-        first = own[0].measured.first
-        early = advance([seen.modes for seen in own], first.sample_time, first.held)
-        if early is not None and max(seen.modes.flat for seen in own) < GroupingConfig().flat:
-            said.append(Check.of("T06", "warn", f"joint {joint} moves {-1e3 * early.value:.3g} ms before its torque: torque and "
-                                 "position have different clocks, or what is faster has folded back (aliasing)",
-                                 where=", ".join(_logs_of(seen.measured) for seen in own), gate=True, remedy=_UNFOLDED))
+        said += _advancing([seen for seen in found.seen if seen.measured.joint == joint])
     for seen in found.seen:
         m = seen.measured
-        inside = m.plant.within(*seen.modes.band)
-        low = float(np.mean(inside.coherence < COHERENCE))
+        low = float(np.mean(m.plant.within(*seen.modes.band).coherence < COHERENCE))
         if low > 0.0:
-            said.append(Check.of("D13", "warn", f"the coherence of joint {m.joint} is under {COHERENCE:g} at {100.0 * low:.2g} % "
-                                 "of the frequencies of its excited band; they are shaded and hardly weigh", where=_logs_of(m),
-                                 remedy="excite these frequencies more strongly, or record longer"))
-        said += _turning(m.joint, m.first.speed, max(t.swing for t in m.turned), _logs_of(m))
+            words = (
+                f"the coherence of joint {m.joint} is under {COHERENCE:g} at {100.0 * low:.2g} % "
+                "of the frequencies of its excited band; they are shaded and hardly weigh"
+            )
+            remedy = "excite these frequencies more strongly, or record longer"
+            said.append(Check.of("D13", "warn", words, where=_logs_of(m), remedy=remedy))
+        said += _turning(m)
     return said
 
 
@@ -178,23 +167,78 @@ def _logs_of(measured: Measured) -> str:
     return ", ".join(t.name for t in measured.turned)
 
 
-def _turning(joint: int, speed: float, swing: float, where: str) -> Sequence[Check]:
+def _unusable(one: Measured, settings: Settings) -> Check:
+    if one.aliased:
+        code, remedy = "T09", _UNFOLDED
+        words = (
+            f"torque of joint {one.joint} was sampled, and v has power up to half the rate: what "
+            "is faster has folded back (aliasing), and no mode can be identified"
+        )
+    else:
+        code = "D13"
+        remedy = "excite more strongly, record longer, or look for what disturbs the joint"
+        words = (
+            f"v tells nothing of joint {one.joint} from {settings.low:g} to {settings.high:g} Hz: "
+            "no frequency can be relied on, no mode is looked for"
+        )
+    return Check.of(code, "warn", words, where=_logs_of(one), gate=True, remedy=remedy)
+
+
+def _advancing(own: list[Seen]) -> list[Check]:
+    """T06: position comes before torque."""
+    first = own[0].measured.first
+    early = advance([seen.modes for seen in own], first.sample_time, first.held)
+    if early is None or max(seen.modes.flat for seen in own) >= GroupingConfig().flat:
+        return []
+    words = (
+        f"joint {first.joint} moves {-1e3 * early.value:.3g} ms before its torque: torque and "
+        "position have different clocks, or what is faster has folded back (aliasing)"
+    )
+    where = ", ".join(_logs_of(seen.measured) for seen in own)
+    return [Check.of("T06", "warn", words, where=where, gate=True, remedy=_UNFOLDED)]
+
+
+def _turning(m: Measured) -> list[Check]:
+    speed, swing = m.first.speed, max(t.swing for t in m.turned)
     if speed == 0.0:
-        return [Check.of("D09", "warn", f"joint {joint} did not turn: friction sticks, and looks like a spring in the response",
-                         where=where, remedy="let it turn slowly while it is excited")]
-    if swing > _CONFIG.swing * speed:
-        return [Check.of("D09", "warn", f"the excitation swings the speed of joint {joint} by {swing:.2g} about {speed:.2g} rad/s: "
-                         "friction now and then turns its sign, which adds damping", where=where,
-                         remedy="turn faster, or excite more weakly")]
-    return []
+        words = (
+            f"joint {m.joint} did not turn: friction sticks, and looks like a spring in the "
+            "response"
+        )
+        remedy = "let it turn slowly while it is excited"
+    elif swing > SwingConfig().swing * speed:
+        words = (
+            f"the excitation swings the speed of joint {m.joint} by {swing:.2g} about {speed:.2g} "
+            "rad/s: friction now and then turns its sign, which adds damping"
+        )
+        remedy = "turn faster, or excite more weakly"
+    else:
+        return []
+    return [Check.of("D09", "warn", words, where=_logs_of(m), remedy=remedy)]
 
 
 def report(result: Result) -> Report:
-    """The verdict, Fig. 17's Bode plots with coherence, modes, rigid body, grouping."""
-    return frf_report(result.responses, result.postures, result.classification, result.undecided, result.data_quality, result.drawn)
+    """Report the verdict, Fig. 17's Bode plots with coherence, modes, rigid body, grouping."""
+    return frf_report(
+        result.responses,
+        result.postures,
+        result.classification,
+        result.undecided,
+        result.data_quality,
+        result.drawn,
+    )
 
 
-STAGE = Stage("frf", "Measure frequency responses and classify compliance", Settings, compute, report, read, None,
-              lambda result, check: int(check and any(found.gate for found in result.data_quality)),
-              lambda result: result.data_quality,
-              uses=Uses(lambda log, settings: log.experiment == "frf", before=True), sessions="one")
+STAGE = Stage(
+    "frf",
+    "Measure frequency responses and classify compliance",
+    Settings,
+    compute,
+    report,
+    read,
+    None,
+    lambda result, check: int(check and any(found.gate for found in result.data_quality)),
+    lambda result: result.data_quality,
+    uses=Uses(lambda log, settings: log.experiment == "frf", before=True),
+    sessions="one",
+)

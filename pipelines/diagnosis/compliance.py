@@ -16,7 +16,8 @@ from pipelines.diagnosis.result import Answer, NotIdentifiable
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.effects import all_effects, find_effect
 from pipelines.errors import InputRejected
-from pipelines.frequency import findings as frf
+from pipelines.frequency.findings import Seen, frf_findings
+from pipelines.frequency.grouping import Finding
 from pipelines.frequency.modes import relative_acceleration
 from pipelines.io.log import ExperimentLog
 
@@ -37,7 +38,7 @@ class Compliance:
 
     named: tuple[Acting, ...]
     open: str  # what they leave open, in words; empty where they do not
-    seen: tuple[frf.Seen, ...] = field(default=(), repr=False)
+    seen: tuple[Seen, ...] = field(default=(), repr=False)
     # place of a cause -> joints that show it
     seen_at: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
@@ -54,7 +55,7 @@ def compliance(
     if not logs:
         return None
     try:
-        found = frf.frf_findings(logs, arm)
+        found = frf_findings(logs, arm)
     except InputRejected as refused:
         return Compliance((), f"the frequency responses are of no use: {refused.message}")
     kinds = {kind.name for kind in all_effects() if kind.evidence == "frequency responses"}
@@ -100,7 +101,7 @@ def untold(told: Compliance | None, without: Sequence[str] = ()) -> tuple[NotIde
     )
 
 
-def _acting(one: frf.Finding, arm: Arm) -> Acting:
+def _acting(one: Finding, arm: Arm) -> Acting:
     """Return the cause with the numbers that the responses give."""
     kind = find_effect(one.cause or "")
     joint = one.joint if kind.scope == "joint" else None
@@ -110,7 +111,7 @@ def _acting(one: frf.Finding, arm: Arm) -> Acting:
     return Acting.of(kind(joint=joint), values, stds, revolute=turning)
 
 
-def _answer(one: frf.Seen) -> Answer:
+def _answer(one: Seen) -> Answer:
     first = one.measured.first
     shown = relative_acceleration(one.measured).within(*one.modes.band)
     unit = "1" if first.quantity == "r" else "1/(kg m^2)" if first.revolute else "1/kg"

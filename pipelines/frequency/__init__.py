@@ -1,1 +1,1 @@
-"""From logs of a slowly turning, excited joint to its frequency responses, their modes, and what bends."""
+"""Frequency responses of a slowly turning, excited joint, their modes, and what bends."""

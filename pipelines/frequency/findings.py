@@ -1,14 +1,15 @@
-"""What gives way, from the responses of all joints and postures: base, joint, delay or nothing, each with its evidence.
+"""Name compliance in all joints and postures: base, joint, delay or none, with evidence.
 
     found = frf_findings(logs, arm)
     found.classification       what is sure
     found.undecided            what is there and could be more than one thing, and what to record
 
-Kostić et al. 2004, Section IV.D: the base shows at the same frequency in every posture, with a temporary phase lead; what bends in
-the arm moves with the posture. A pair of antiresonance and resonance is explained by masses and springs of either kind with the
-inertia measured in each posture; the one is chosen that explains all postures far better. Where the postures do not tell, only
-what drops out does: a base does not weigh less than the arm it carries. Wrongly naming one for the other is worse than saying
-that it is open.
+Kostić et al. 2004, Section IV.D: the base shows at the same frequency in every posture, with a
+temporary phase lead; what bends in the arm moves with the posture. A pair of antiresonance and
+resonance is explained by masses and springs of either kind with the inertia measured in each
+posture; the one is chosen that explains all postures far better. Where the postures do not tell,
+only what drops out does: a base does not weigh less than the arm it carries. Wrongly naming one for
+the other is worse than saying that it is open.
 """
 
 from __future__ import annotations
@@ -19,37 +20,35 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.dynamics.arm import Arm
-from pipelines.errors import InputRejected
-from pipelines.frequency.grouping import Finding, GroupingConfig, Open, group_joint, seen_elsewhere
+from pipelines.errors import InputRejected, RrridError
+from pipelines.frequency.config import GroupingConfig, SignConfig
+from pipelines.frequency.grouping import Finding, Open, group_joint, seen_elsewhere
 from pipelines.frequency.modes import BAND, Modes, fitted_modes, relative_acceleration, tells
-from pipelines.frequency.rational import Known
 from pipelines.frequency.responses import How, Measured, measured_responses
-from pipelines.frequency.rigid import Expected, expected_rigid
+from pipelines.frequency.signals import Turned
 from pipelines.io.log import ExperimentLog
+from pipelines.io.model_file import parse_model
 
-__all__ = ["Finding", "Findings", "Known", "Open", "Seen", "findings_of", "frf_findings", "grouped"]
+__all__ = ["Expected", "Findings", "Seen", "frf_findings", "grouped"]
+
+_CONFIG = SignConfig()
 
 
 @dataclass(frozen=True)
-class SignConfig:
-    """When a joint accelerates against its input.
+class Expected:
+    """The response expected of a rigid body: the double integrator with the inertia of the posture.
 
-    Attributes:
-        slow: [Hz] up to which friction and delay turn the phase by less than a right angle
-        first: times the lowest excited frequency, up to where the sign is seen first: between two modes the phase is turned round
-        reliable: coherence
-        fewest: bins
-        against: cosine of the phase: beyond 120°
+    under computed torque   q_j/r_j = D̂_jj(q) / D_jj(q) · 1/s²
+    under PD                q_j/τ_j = 1 / (D_jj(q) s²)
+
+    sampled and held, the other joints standing still. D̂ is the inertia of the controller's model, D
+    that of the arm's: where no better model is known they are one, and the response is 1/s² (Kostić
+    et al. 2004, eq. (26)).
     """
 
-    slow: float = 20.0
-    first: float = 2.0
-    reliable: float = 0.7
-    fewest: int = 3
-    against: float = -0.5
-
-
-_CONFIG = SignConfig()
+    level: float | None  # of the acceleration per input: 1 or D̂/D, 1/D under PD [1/(kg m^2)]
+    inertia: float | None  # D_jj [kg m^2] in the posture
+    source: str  # whose model: "given model", "controller's model", "none"
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,45 +65,54 @@ class Findings:
     """Of all "frf" logs of an arm."""
 
     seen: tuple[Seen, ...]
-    unusable: tuple[Measured, ...]  # responses in whose band the excitation tells nothing: neither fitted nor named
+    unusable: tuple[Measured, ...]  # in whose band the excitation tells nothing: nothing is named
     classification: tuple[Finding, ...]
     undecided: tuple[Open, ...]
 
 
-def frf_findings(logs: Iterable[ExperimentLog], arm: Arm | None = None, how: How | None = None,
-                 band: tuple[float, float] = BAND) -> Findings:
-    """Responses, modes and grouping of "frf" logs.
+def frf_findings(
+    logs: Iterable[ExperimentLog],
+    arm: Arm | None = None,
+    how: How | None = None,
+    band: tuple[float, float] = BAND,
+) -> Findings:
+    """Return responses, modes and grouping of "frf" logs.
 
     Args:
         logs: of experiment "frf", of one robot.
-        arm: its model, for the inertia to expect; None: the controller's own, where the logs carry it.
+        arm: its model, for the inertia to expect; None: the controller's own, where logs carry it.
+        how: spectra are taken.
         band: [Hz] in which modes are looked for.
 
     Raises:
-        InputRejected: a log that no spectrum can be taken of, with what to record: S01, T05, T08, D04, D09; S14, a joint that
-            accelerates against its input.
+        InputRejected: a log that no spectrum can be taken of, with what to record: S01, T05, T08,
+            D04, D09; S14, a joint that accelerates against its input.
     """
-    return findings_of(measured_responses(logs, how), arm, band)
-
-
-def findings_of(measured: Sequence[Measured], arm: Arm | None = None, band: tuple[float, float] = BAND) -> Findings:
-    """The same, of responses that are there already."""
+    measured = measured_responses(logs, how)
     for one in measured:
         _check_sign(one)
-    usable = [one for one in measured if tells(one, band)]
-    seen = tuple(Seen(one, fitted_modes(one, band), expected_rigid(one, arm)) for one in usable)
-    return Findings(seen, tuple(one for one in measured if not tells(one, band)), *grouped(seen))
+    told = [tells(one, band) for one in measured]
+    seen = tuple(
+        Seen(one, fitted_modes(one, band), _expected(one.first, arm))
+        for one, does in zip(measured, told, strict=True)
+        if does
+    )
+    unusable = tuple(one for one, does in zip(measured, told, strict=True) if not does)
+    return Findings(seen, unusable, *grouped(seen))
 
 
-def grouped(seen: Sequence[Seen], config: GroupingConfig | None = None) -> tuple[tuple[Finding, ...], tuple[Open, ...]]:
-    """What is sure, and what is open, from the modes of all joints and postures."""
+def grouped(
+    seen: Sequence[Seen], config: GroupingConfig | None = None
+) -> tuple[tuple[Finding, ...], tuple[Open, ...]]:
+    """Return what is sure, and what is open, from the modes of all joints and postures."""
     sure: list[Finding] = []
     unsure: list[Open] = []
     for joint in sorted({one.measured.joint for one in seen}):
         own = [one for one in seen if one.measured.joint == joint]
+        modes, loads = [one.modes for one in own], [one.measured.load for one in own]
         turned = own[0].measured.first
-        found, left = group_joint(joint, [one.modes for one in own], turned.sample_time, turned.revolute, turned.held,
-                                  [one.measured.load for one in own], config)
+        kind = (turned.sample_time, turned.revolute, turned.held)
+        found, left = group_joint(joint, modes, *kind, loads, config)
         sure += found
         unsure += left
     return seen_elsewhere(sure, unsure, config)
@@ -112,11 +120,47 @@ def grouped(seen: Sequence[Seen], config: GroupingConfig | None = None) -> tuple
 
 def _check_sign(measured: Measured) -> None:
     whole = relative_acceleration(measured)
-    whole = whole.where(measured.excited.holds(whole.frequency) & (whole.coherence >= _CONFIG.reliable))
+    reliable = whole.coherence >= _CONFIG.reliable
+    whole = whole.where(measured.excited.holds(whole.frequency) & reliable)
     slow = whole.within(0.0, _CONFIG.slow)
     slow = slow.within(0.0, _CONFIG.first * float(slow.frequency.min(initial=_CONFIG.slow)))
-    if len(slow.frequency) >= _CONFIG.fewest and all(float(np.median(one.response.real / np.abs(one.response))) < _CONFIG.against
-                                              for one in (slow, whole)):
+    if len(slow.frequency) < _CONFIG.fewest:
+        return
+    cosines = [np.median(one.response.real / np.abs(one.response)) for one in (slow, whole)]
+    if max(cosines) < _CONFIG.against:
         first = measured.first
-        raise InputRejected("S14", f"joint {measured.joint} accelerates against its input {first.quantity}", where=first.name,
-                            remedy=f"reverse the sign of {first.quantity}, or of q, in the recipe")
+        words = f"joint {measured.joint} accelerates against its input {first.quantity}"
+        remedy = f"reverse the sign of {first.quantity}, or of q, in the recipe"
+        raise InputRejected("S14", words, where=first.name, remedy=remedy)
+
+
+def _expected(turned: Turned, arm: Arm | None) -> Expected:
+    """Return the level of acceleration to expect, and the inertia behind it."""
+    given, theirs = _inertia(arm, turned), _inertia(_controllers(turned), turned)
+    inertia, source = given, "given model"
+    if given is None:
+        inertia, source = theirs, "none" if theirs is None else "controller's model"
+    if turned.quantity == "tau":
+        return Expected(None if inertia is None else 1.0 / inertia, inertia, source)
+    level = 1.0 if inertia is None or theirs is None else theirs / inertia
+    return Expected(level, inertia, source)
+
+
+def _controllers(turned: Turned) -> Arm | None:
+    text = turned.controller.model if turned.controller is not None else None
+    try:
+        return None if text is None else Arm.from_model(parse_model(text))
+    except RrridError:
+        return None  # a model that cannot be read is one that is not there
+
+
+def _inertia(arm: Arm | None, turned: Turned) -> float | None:
+    """D_jj in the posture; the angle of joint j itself does not change it.
+
+    A model of friction alone, as a run has where base parameters were refused, knows of none.
+    """
+    if arm is None:
+        return None
+    j = turned.joint - 1
+    found = float(arm.body.mass_matrix(turned.posture[None], arm.p)[0, j, j])
+    return found if found > 0.0 else None

@@ -1,83 +1,48 @@
-"""Group the modes of one joint across its postures: base, joint, delay, rigid, or open; the evidence in words and numbers."""
+"""Group the modes of one joint across its postures: base, joint, delay, rigid, or open.
+
+Every answer has its evidence in words and numbers.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from pipelines.frequency.config import GroupingConfig
 from pipelines.frequency.modes import Modes, Pair
 from pipelines.frequency.rational import Known
 from pipelines.frequency.springs import Explained, explain
+from pipelines.io.results import NOT_STORED
 
-__all__ = ["Finding", "GroupingConfig", "Open", "advance", "group_joint", "seen_elsewhere"]
+__all__ = ["Finding", "Open", "advance", "group_joint", "seen_elsewhere"]
 
-@dataclass(frozen=True)
-class GroupingConfig:
-    """Numbers that decide what a mode is.
-
-    Attributes:
-        tells: χ² by which one explanation must be better: three standard deviations.
-        fits: χ² per number beyond which an explanation is none: two deviations.
-        heavy: rise above which what drops out outweighs the rest, (f_r/f_a)² = 1 + J_dropped/J_left: no base drops out so.
-        light: of the arm's inertia: no base weighs less, or the arm would carry it.
-        moves: ratio of inertias from which postures can tell base from joint: four of the frequencies' `slack` of .8 %.
-        flat: a ratio of magnitudes below it is flat, 1.2 dB: half the step by a motor of a quarter of the inertia. Nothing is
-            called rigid where 95 % of the frequencies are not known to as much. Sensitivity in benchmarks/README.
-        span: highest over lowest frequency, two octaves, of a band in which a joint without a mode is called rigid.
-        delay: of the sample time, the smallest worth a word; the hold alone makes half of one.
-        sure: standard deviations of a delay.
-        near: share of a frequency within which two joints show the same base.
-        misfit: over the variance of noise, beyond which no mode of the fit is believed: F of many bins at 1e-6 is near 2, and
-            variances from few averages are off by as much again.
-        left: of the response, what a misfit may leave all the same: encoder steps that repeat are in no variance.
-        trace: rise of a pair that may be only a trace of what another joint, or the base, does.
-        locked: share of the frequency at which a link swings against its locked motor, within which it takes motion away.
-        closed: deviations of the torque by which its mean, less friction, keeps the load on one side: a normal one is beyond for
-            one sample in 44, and the describing function of a gap moves by no more.
-        contact: damping ratio that teeth in contact have at least, .03 to .17 (Kasuba, Evans 1981, ASME J. Mech. Des. 103); shafts
-            have .005 to .075 (Lin, Huston, Coy 1988, NASA TM-100180).
-    """
-
-    tells: float = 9.0
-    fits: float = 4.0
-    heavy: float = 2.0
-    light: float = 0.5
-    moves: float = 1.03
-    flat: float = 1.15
-    span: float = 4.0
-    delay: float = 0.15
-    sure: float = 5.0
-    near: float = 0.03
-    misfit: float = 10.0
-    left: float = 0.02
-    trace: float = 1.3
-    locked: float = 0.1
-    closed: float = 2.0
-    contact: float = 0.03
+_BASE, _JOINT = "base_resonance", "joint_elasticity"
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is sure."""
+    """A cause that is sure."""
 
     kind: str  # "base", "joint", "rigid", "delay"
     joint: int | None  # 1-based; None: the base
     evidence: str
-    cause: str | None  # as the library of causes calls it; None: nothing is wrong
-    frequency: Known | None  # [Hz] of the base's resonance; of the joint's antiresonance, its motor locked
-    damping: Known | None  # ratio, of the same
-    parameters: Mapping[str, Known]  # as findings report them, SI
-    seen_at: tuple[int, ...]  # joints
-    faint: bool = False  # its pairs are so small that they may be a trace of what another joint does
-    stands: tuple[Known, ...] = ()  # [Hz] of a base: the antiresonance in each posture
-    frequencies: tuple[Known, ...] = ()  # [Hz] what `frequency` is in each posture
+    cause: str | None = None  # as the library of causes calls it; None: nothing is wrong
+    frequency: Known | None = None  # [Hz] of the base's resonance; of the joint's antiresonance
+    damping: Known | None = None  # ratio, of the same
+    parameters: Mapping[str, Known] = field(default_factory=dict)  # SI
+    seen_at: tuple[int, ...] = ()  # joints
+    # its pairs are so small that they may be a trace of what another joint does
+    faint: bool = field(default=False, metadata=NOT_STORED)
+    # [Hz] of a base: the antiresonance in each posture
+    stands: tuple[Known, ...] = field(default=(), metadata=NOT_STORED)
+    frequencies: tuple[Known, ...] = ()  # [Hz] `frequency` in each posture
 
 
 @dataclass(frozen=True)
 class Open:
-    """One thing that is there and could be more than one."""
+    """An observation with more than one possible cause."""
 
     joint: int
     frequency: Known | None  # [Hz]
@@ -86,142 +51,236 @@ class Open:
     experiment: str  # what to record to tell
 
 
-def advance(modes: Sequence[Modes], sample_time: float, held: bool = True, config: GroupingConfig | None = None) -> Known | None:
-    """The delay [s], where it is negative beyond doubt: no position comes before its torque."""
+Grouped = tuple[list[Finding], list[Open]]
+
+
+@dataclass(frozen=True)
+class _Joint:
+    """One joint in all its postures."""
+
+    number: int
+    modes: Sequence[Modes]
+    sample_time: float
+    unit: str  # of the inertia
+    held: bool
+    config: GroupingConfig
+
+    def open(self, frequency: Known | None, candidates: Sequence[str], why: str, ask: str) -> Open:
+        """Return a question about this joint."""
+        return Open(self.number, frequency, tuple(candidates), why, ask)
+
+    @property
+    def inertia(self) -> list[float]:
+        """Of each posture [kg m^2]."""
+        return [m.inertia.value if m.inertia else np.nan for m in self.modes]
+
+    @property
+    def postures(self) -> str:
+        """How many there are, in words."""
+        return "one posture" if len(self.modes) == 1 else f"{len(self.modes)} postures"
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """[Hz] that all postures tell."""
+        return max(m.band[0] for m in self.modes), min(m.band[1] for m in self.modes)
+
+    @property
+    def flat(self) -> float:
+        """Ratio by which the magnitude changes beside the modes, at most."""
+        return max(m.flat for m in self.modes)
+
+
+def advance(
+    modes: Sequence[Modes],
+    sample_time: float,
+    held: bool = True,
+    config: GroupingConfig | None = None,
+) -> Known | None:
+    """Return the delay [s], where it is negative beyond doubt: position leads its torque."""
     mean = _late(modes, sample_time, held, config or GroupingConfig())
     return mean if mean is not None and mean.value < 0.0 else None
 
 
-def group_joint(joint: int, modes: Sequence[Modes], sample_time: float, revolute: bool = True, held: bool = True,
-                loads: Sequence[float] = (), config: GroupingConfig | None = None) -> tuple[list[Finding], list[Open]]:
-    """What the responses of one joint (1-based), one a posture, say together.
+def group_joint(
+    joint: int,
+    modes: Sequence[Modes],
+    sample_time: float,
+    revolute: bool = True,
+    held: bool = True,
+    loads: Sequence[float] = (),
+    config: GroupingConfig | None = None,
+) -> Grouped:
+    """Return what the responses of one joint (1-based), one a posture, say together.
 
     Args:
+        joint: 1-based.
+        modes: of each posture.
         sample_time: [s].
         revolute: whether it turns.
-        held: whether its input is held from one sample to the next; if it was measured, nobody knows when within a sample.
+        held: whether its input is held over a sample; else the instant is unknown.
         loads: mean torque less friction over its deviation, of each posture.
+        config: what decides.
+
+    A gap answers as a spring does as long as it stays closed, and on average where it is crossed
+    (its describing function: Gelb, Vander Velde 1968, ch. 2): no open question leaves it out, and no
+    spring under a steady load that is damped as teeth are.
     """
     config = config or GroupingConfig()
-    found, left = _grouped(joint, modes, sample_time, revolute, held, config)
-    return _loaded(found, left, loads, config)
-
-
-def _loaded(found: list[Finding], left: list[Open], loads: Sequence[float],
-            config: GroupingConfig) -> tuple[list[Finding], list[Open]]:
-    """A gap answers as a spring does wherever it stays closed, and on average where it is crossed (its describing function: Gelb,
-    Vander Velde 1968, ch. 2): no open question leaves it out, and no spring under a steady load that is damped as teeth are."""
-    left = [replace(one, candidates=(*one.candidates, "backlash"))
-            if "joint_elasticity" in one.candidates and "backlash" not in one.candidates else one for one in left]
+    unit = "kg m²" if revolute else "kg"
+    found, left = _grouped(_Joint(joint, modes, sample_time, unit, held, config))
+    left = [
+        replace(one, candidates=(*one.candidates, "backlash"))
+        if _JOINT in one.candidates and "backlash" not in one.candidates
+        else one
+        for one in left
+    ]
     if not loads or min(abs(load) for load in loads) < config.closed:
         return found, left
+    sure = []
     for one in found:
-        if one.kind == "joint" and one.damping is not None and one.damping.value + 2.0 * one.damping.std > config.contact:
-            assert one.joint is not None
-            left.append(Open(one.joint, one.frequency, ("joint_elasticity", "backlash"),
-                             f"{one.evidence} But the load on the joint never changes its sign, and a damping ratio of "
-                             f"{one.damping.value:.2g} is that of teeth in contact as well: a gap would stay closed.",
-                             f"joint {one.joint} in a posture without load by gravity, or excited until its torque changes sign"))
-    shut = {one.joint for one in left if one.candidates == ("joint_elasticity", "backlash")}
-    return [one for one in found if one.kind != "joint" or one.joint not in shut], left
+        d = one.damping
+        if one.kind != "joint" or d is None or d.value + 2.0 * d.std <= config.contact:
+            sure.append(one)
+            continue
+        words = (
+            f"{one.evidence} But the load on the joint never changes its sign, and a damping ratio "
+            f"of {d.value:.2g} is that of teeth in contact as well: a gap would stay closed."
+        )
+        ask = (
+            f"joint {joint} in a posture without load by gravity, or excited until its torque "
+            "changes sign"
+        )
+        left.append(Open(joint, one.frequency, (_JOINT, "backlash"), words, ask))
+    return sure, left
 
 
-def _grouped(joint: int, modes: Sequence[Modes], sample_time: float, revolute: bool, held: bool,
-             config: GroupingConfig) -> tuple[list[Finding], list[Open]]:
+def _grouped(own: _Joint) -> Grouped:
+    modes, config = own.modes, own.config
+    worst = max((m.misfit for m in modes if m.left > config.left), default=0.0)
+    if worst > config.misfit:
+        words = (
+            f"No linear plant explains the response: what it leaves has {worst:.3g} times the "
+            "variance of noise. A gap that is crossed, or friction that turns its sign, does so."
+        )
+        ask = "another strength of excitation and a faster turn; else longer"
+        return [], [own.open(None, ("backlash", _JOINT, _BASE), words, ask)]
     most = max(len(m.pairs) for m in modes)
     count = min(len(_strongest(m, most)) for m in modes)
-    if (worst := max((m.misfit for m in modes if m.left > config.left), default=0.0)) > config.misfit:
-        return [], [Open(joint, None, ("backlash", "joint_elasticity", "base_resonance"),
-                         f"No linear plant explains the response: what it leaves has {worst:.3g} times the variance of noise. "
-                         "A gap that is crossed, or friction that turns its sign, does so.",
-                         "another strength of excitation and a faster turn; else longer")]
-    if not count and 2.0 * (left := max(m.left for m in modes)) > config.flat - 1.0:
-        return [], [_scattered(joint, modes, left, config)]
-    if (early := advance(modes, sample_time, held, config)) is not None:
-        return [], [_early(joint, modes, early, config)]
-    delays, unclear = _delay(joint, modes, sample_time, held, config)
+    left, (low, high) = max(m.left for m in modes), own.band
+    if not count and 2.0 * left > config.flat - 1.0:
+        words = (
+            f"No mode is distinct from {low:.3g} to {high:.3g} Hz, but the response scatters by "
+            f"{100.0 * left:.2g} % about a linear plant's: whether it is flat within "
+            f"{100.0 * (config.flat - 1.0):.2g} %, or late, is not known. Noise does so, and a gap "
+            "that is crossed."
+        )
+        ask = "longer, and excited more strongly"
+        return [], [own.open(None, ("backlash", _JOINT, _BASE), words, ask)]
+    late = _late(modes, own.sample_time, own.held, config)
+    if late is not None and late.value < 0.0:
+        return [], [_early(own, late)]
+    delays, unclear = ([], []) if late is None else _delay(own, late)
+    unclear += _leftover(own, count)
     pairs = [_strongest(m, count) for m in modes]
-    unclear += _leftover(joint, modes, count)
-    found, more = _springs(joint, modes, pairs, "kg m²" if revolute else "kg", config) if count else ([], [])
+    found, more = _springs(own, pairs) if count else ([], [])
     if not (found or more or delays or unclear):
-        still = _rigid(joint, modes, config)
-        found, more = ([still], []) if isinstance(still, Finding) else ([], [still])
+        found, more = _rigid(own)
     return [*found, *delays], [*more, *unclear]
 
 
 def _strongest(modes: Modes, count: int) -> list[Pair]:
-    """As many pairs: those that nearly cancel too, where distinct ones are fewer than in another posture."""
+    """As many pairs: those that nearly cancel too, where distinct ones are fewer than elsewhere."""
     several = (*modes.pairs, *modes.faint) if len(modes.pairs) < count else modes.pairs
     kept = sorted(several, key=lambda p: -p.rise)[:count]
     return sorted(kept, key=lambda p: p.antiresonance.frequency.value)
 
 
-def _leftover(joint: int, modes: Sequence[Modes], count: int) -> list[Open]:
-    """What one posture shows and another does not, and what has no partner."""
-    extra = [p.resonance.frequency for m in modes for p in sorted(m.pairs, key=lambda p: -p.rise)[count:]]
-    alone = [m.frequency for one in modes for m in one.single]
+def _leftover(own: _Joint, count: int) -> list[Open]:
+    """Modes that only some postures show, or that have no partner."""
     found = []
-    if extra:
-        found.append(Open(joint, extra[0], ("base_resonance", "joint_elasticity", "backlash"),
-                          f"A pair at {_many(extra)} Hz is seen in some postures of joint {joint} only.",
-                          "the same posture again, longer or excited more strongly"))
-    if alone:
-        found.append(Open(joint, alone[0], ("joint_elasticity", "base_resonance", "drive_lag"),
-                          f"A mode at {_many(alone)} Hz has no partner: antiresonance without resonance above it, or the reverse.",
-                          "excitation to higher frequencies, and a second posture"))
+    by_rise = [sorted(m.pairs, key=lambda p: -p.rise)[count:] for m in own.modes]
+    if extra := [p.resonance.frequency for rest in by_rise for p in rest]:
+        words = f"A pair at {_many(extra)} Hz is seen in some postures of joint {own.number} only."
+        ask = "the same posture again, longer or excited more strongly"
+        found.append(own.open(extra[0], (_BASE, _JOINT, "backlash"), words, ask))
+    if alone := [m.frequency for one in own.modes for m in one.single]:
+        words = (
+            f"A mode at {_many(alone)} Hz has no partner: antiresonance without resonance above "
+            "it, or the reverse."
+        )
+        ask = "excitation to higher frequencies, and a second posture"
+        found.append(own.open(alone[0], (_JOINT, _BASE, "drive_lag"), words, ask))
     return found
 
 
-def _springs(joint: int, modes: Sequence[Modes], pairs: list[list[Pair]], unit: str,
-             config: GroupingConfig) -> tuple[list[Finding], list[Open]]:
-    inertia, slack = [m.inertia.value if m.inertia else float("nan") for m in modes], max(m.slack for m in modes)
-    if not np.isfinite(inertia).all() or min(inertia) <= 0.0:
-        return [], [_open(joint, pairs, "the inertia of the joint could not be measured")]
-    share = [m.inertia.std / m.inertia.value if m.inertia else 0.0 for m in modes]
+def _springs(own: _Joint, pairs: list[list[Pair]]) -> Grouped:
+    config = own.config
+    if not np.isfinite(own.inertia).all() or min(own.inertia) <= 0.0:
+        return [], [_which(own, pairs, "the inertia of the joint could not be measured")]
     if len(pairs[0]) == 1:
-        return _one_spring(joint, pairs, inertia, unit, slack, share, config)
-    if len(pairs[0]) == 2:
-        both = explain(pairs, inertia, True, True, slack, share)
-        if both is not None and len(pairs) > 1 and _accepted(both, config) and _moves(inertia, config):
-            words = (f"{_told(pairs, inertia, unit)}. A base and a spring in the joint together explain both pairs in all "
-                     f"{len(pairs)} postures, within {100.0 * both.worst:.2g} %.")
-            return [_as_base(both, pairs, words, joint, config), _as_joint(joint, both, pairs, inertia, words)], []
-        strong = [sorted(own, key=lambda p: -p.rise) for own in pairs]
-        if all(own[0].rise > config.heavy and own[1].rise < config.trace for own in strong):
-            found, open_ = _one_spring(joint, [[own[0]] for own in strong], inertia, unit, slack, share, config)
-            return found, [*open_, _open(joint, [[own[1]] for own in strong], "a small pair beside a large one")]
-    return [], [_open(joint, pairs, f"{len(pairs[0])} pairs that no base and joint spring explain together")]
+        return _one_spring(own, pairs)
+    base_and_joint = 2
+    if len(pairs[0]) == base_and_joint:
+        both = _explained(own, pairs, (True, True))
+        if both is not None and len(pairs) > 1 and _accepted(both, config) and _moves(own):
+            words = (
+                f"{_told(own, pairs)}. A base and a spring in the joint together explain both "
+                f"pairs in all {len(pairs)} postures, within {100.0 * both.worst:.2g} %."
+            )
+            return [_as_base(own, both, pairs, words), _as_joint(own, both, pairs, words)], []
+        strong = [sorted(one, key=lambda p: -p.rise) for one in pairs]
+        if all(a.rise > config.heavy and b.rise < config.trace for a, b in strong):
+            found, left = _one_spring(own, [one[:1] for one in strong])
+            weak = [one[1:] for one in strong]
+            return found, [*left, _which(own, weak, "a small pair beside a large one")]
+    words = f"{len(pairs[0])} pairs that no base and joint spring explain together"
+    return [], [_which(own, pairs, words)]
 
 
-def _one_spring(joint: int, pairs: list[list[Pair]], inertia: list[float], unit: str,
-                slack: float, share: Sequence[float], config: GroupingConfig) -> tuple[list[Finding], list[Open]]:
-    base, spring = (explain(pairs, inertia, *which, slack, share, config.light) for which in ((True, False), (False, True)))
-    assert base is not None
-    assert spring is not None
-    told = _told(pairs, inertia, unit)
-    rise = float(np.mean([own[0].rise for own in pairs]))
-    assert base.base is not None
+def _one_spring(own: _Joint, pairs: list[list[Pair]]) -> Grouped:
+    config, told = own.config, _told(own, pairs)
+    base = _explained(own, pairs, (True, False))
+    spring = _explained(own, pairs, (False, True))
+    if base is None or spring is None or base.base is None or spring.joint is None:
+        raise AssertionError("one pair a posture is one spring's")
+    rise = float(np.mean([one[0].rise for one in pairs]))
+    higher = f"the level above the resonance is {rise:.3g} times that below"
     if spring.misfit > base.misfit + config.tells and _accepted(base, config):
-        words = (f"{told}. The resonance stays where it is while the inertia changes, with a phase lead between the two: a base of "
-                 f"{base.base[1]:.3g} {unit} explains every frequency within {100.0 * base.worst:.2g} %, a spring in the "
-                 f"joint {_within(spring)}.")
-        return [_as_base(base, pairs, words, joint, config)], []
+        words = (
+            f"{told}. The resonance stays where it is while the inertia changes, with a phase lead "
+            f"between the two: a base of {base.base[1]:.3g} {own.unit} explains every frequency "
+            f"within {100.0 * base.worst:.2g} %, a spring in the joint {_within(spring)}."
+        )
+        return [_as_base(own, base, pairs, words)], []
     if base.misfit > spring.misfit + config.tells and _accepted(spring, config):
-        assert spring.joint is not None
-        words = (f"{told}. The antiresonance moves with the posture as a link on a spring does. The level above the resonance is "
-                 f"{rise:.3g} times that below: 1/J of a motor of {spring.joint[1]:.3g} {unit}. A spring in the joint explains "
-                 f"every frequency within {100.0 * spring.worst:.2g} %, a base {_within(base)}.")
-        return [_as_joint(joint, spring, pairs, inertia, words)], []
-    if _accepted(spring, config) and all(own[0].rise > config.heavy for own in pairs):
-        assert spring.joint is not None
-        words = (f"{told}. The postures do not tell base and joint apart, but the level above the resonance is {rise:.3g} times "
-                 f"that below: what drops out there outweighs the rest, {spring.joint[1]:.3g} {unit}. That is a link behind a "
-                 "spring, not a base lighter than its arm.")
-        return [_as_joint(joint, spring, pairs, inertia, words)], []
-    why = "one posture only" if len(pairs) == 1 else \
-        "the inertia hardly differs between the postures" if not _moves(inertia, config) \
-        else f"a base explains it {_within(base)}, a spring in the joint {_within(spring)}"
-    return [], [_open(joint, pairs, f"{told}; {why}")]
+        words = (
+            f"{told}. The antiresonance moves with the posture as a link on a spring does. "
+            f"T{higher[1:]}: 1/J of a motor of {spring.joint[1]:.3g} {own.unit}. A spring in the "
+            f"joint explains every frequency within {100.0 * spring.worst:.2g} %, a base "
+            f"{_within(base)}."
+        )
+        return [_as_joint(own, spring, pairs, words)], []
+    if _accepted(spring, config) and all(one[0].rise > config.heavy for one in pairs):
+        words = (
+            f"{told}. The postures do not tell base and joint apart, but {higher}: what drops out "
+            f"there outweighs the rest, {spring.joint[1]:.3g} {own.unit}. That is a link behind a "
+            "spring, not a base lighter than its arm."
+        )
+        return [_as_joint(own, spring, pairs, words)], []
+    why = f"a base explains it {_within(base)}, a spring in the joint {_within(spring)}"
+    if len(pairs) == 1:
+        why = "one posture only"
+    elif not _moves(own):
+        why = "the inertia hardly differs between the postures"
+    return [], [_which(own, pairs, f"{told}; {why}")]
+
+
+def _explained(
+    own: _Joint, pairs: list[list[Pair]], springs: tuple[bool, bool]
+) -> Explained | None:
+    slack = max(m.slack for m in own.modes)
+    share = [m.inertia.std / m.inertia.value if m.inertia else 0.0 for m in own.modes]
+    return explain(pairs, own.inertia, springs, slack, share, own.config.light)
 
 
 def _within(one: Explained) -> str:
@@ -232,191 +291,243 @@ def _accepted(one: Explained, config: GroupingConfig) -> bool:
     return one.misfit <= config.tells + config.fits * one.freedom
 
 
-def _moves(inertia: Sequence[float], config: GroupingConfig) -> bool:
+def _moves(own: _Joint) -> bool:
     """Return whether postures differ enough in inertia to tell by."""
-    return max(inertia) > config.moves * min(inertia)
+    return max(own.inertia) > own.config.moves * min(own.inertia)
 
 
-def _as_base(one: Explained, pairs: list[list[Pair]], words: str, joint: int, config: GroupingConfig) -> Finding:
-    assert one.base is not None
-    frequency, inertia = (Known(v, v * s) for v, s in zip(one.base, one.std[:2], strict=True))
-    near = [min(own, key=lambda p: abs(p.resonance.frequency.value - frequency.value)) for own in pairs]
+def _as_base(own: _Joint, one: Explained, pairs: list[list[Pair]], words: str) -> Finding:
+    frequency, inertia = one.base or (np.nan, np.nan)
+
+    def off(pair: Pair) -> float:
+        return abs(pair.resonance.frequency.value - frequency)
+
+    near = [min(several, key=off) for several in pairs]
     each = tuple(p.resonance.frequency for p in near)
     measured, damping = _mean(each), _mean([p.resonance.damping for p in near])
-    numbers = {"frequency": measured, "damping_ratio": damping, "inertia": inertia}
-    return Finding("base", None, words, "base_resonance", measured, damping, numbers, (joint,),
-                   max(p.rise for p in near) < config.trace, tuple(p.antiresonance.frequency for p in near), each)
+    known = Known(inertia, inertia * one.std[1])
+    return Finding(
+        kind="base",
+        joint=None,
+        evidence=words,
+        cause=_BASE,
+        frequency=measured,
+        damping=damping,
+        parameters={"frequency": measured, "damping_ratio": damping, "inertia": known},
+        seen_at=(own.number,),
+        faint=max(p.rise for p in near) < own.config.trace,
+        stands=tuple(p.antiresonance.frequency for p in near),
+        frequencies=each,
+    )
 
 
-def _as_joint(joint: int, one: Explained, pairs: list[list[Pair]], inertia: list[float], words: str) -> Finding:
-    assert one.joint is not None
-    stiffness, motor = (Known(v, v * s) for v, s in zip(one.joint, one.std[-2:], strict=True))
-    link = np.array(inertia) - motor.value
-    locked = np.sqrt(stiffness.value / link) / (2.0 * np.pi)
-    near = [min(own, key=lambda p: abs(p.antiresonance.frequency.value - f)) for own, f in zip(pairs, locked, strict=True)]
+def _as_joint(own: _Joint, one: Explained, pairs: list[list[Pair]], words: str) -> Finding:
+    k, motor = one.joint or (np.nan, np.nan)
+    link = np.array(own.inertia) - motor
+    locked = np.sqrt(k / link) / (2.0 * np.pi)
+    near = []
+    for several, f in zip(pairs, locked.tolist(), strict=True):
+        off = [abs(p.antiresonance.frequency.value - f) for p in several]
+        near.append(several[off.index(min(off))])
     damping = _mean([p.antiresonance.damping for p in near])
-    d = [2.0 * p.antiresonance.damping.value * np.sqrt(stiffness.value * j) for p, j in zip(near, link, strict=True)]
-    value, mean_link = float(np.mean(d)), float(np.mean(link))
-    # d = 2 ζ √(k (J - J_m)): what is known of k and J_m is in d as well.
-    slope = value * np.array([1.0 / max(abs(damping.value), 1e-9), 0.5, -0.5 * motor.value / mean_link])
-    known = np.zeros((3, 3))
-    known[0, 0], known[1:, 1:] = damping.std**2, one.covariance[-2:, -2:]  # of ζ, log k, log J_m
-    std = float(np.sqrt(slope @ known @ slope))
-    frequency = float(np.sqrt(stiffness.value / mean_link) / (2.0 * np.pi))
     each = tuple(p.antiresonance.frequency for p in near)
-    scatter = float(np.std([v.value for v in each]))  # it moves with the posture: one number stands for all of them
-    return Finding("joint", joint, words, "joint_elasticity",
-                   Known(frequency, float(np.hypot(scatter, frequency * max(v.std / v.value for v in each)))),
-                   damping, {"stiffness": stiffness, "damping": Known(value, std),
-                             "frequency": Known(frequency, float(np.hypot(scatter, 0.5 * frequency * one.std[-2]))),
-                             "motor_inertia": motor}, (joint,), frequencies=each)
+    # d = 2 ζ √(k (J - J_m)): what is known of k and J_m is in d as well.
+    ratios, mean_link = [p.antiresonance.damping.value for p in near], float(np.mean(link))
+    d = float(np.mean(2.0 * np.array(ratios) * np.sqrt(k * link)))
+    slope = d * np.array([1.0 / max(abs(damping.value), 1e-9), 0.5, -0.5 * motor / mean_link])
+    known = np.zeros((3, 3))
+    known[0, 0], known[1:, 1:] = damping.std**2, one.covariance[-2:, -2:]  # ζ, log k, log J_m
+    frequency = float(np.sqrt(k / mean_link) / (2.0 * np.pi))
+    # it moves with the posture: one number stands for all of them
+    scatter = float(np.std([v.value for v in each]))
+    measured = frequency * max(v.std / v.value for v in each)
+    fitted = 0.5 * frequency * one.std[-2]
+    return Finding(
+        kind="joint",
+        joint=own.number,
+        evidence=words,
+        cause=_JOINT,
+        frequency=Known(frequency, float(np.hypot(scatter, measured))),
+        damping=damping,
+        parameters={
+            "stiffness": Known(k, k * one.std[-2]),
+            "damping": Known(d, float(np.sqrt(slope @ known @ slope))),
+            "frequency": Known(frequency, float(np.hypot(scatter, fitted))),
+            "motor_inertia": Known(motor, motor * one.std[-1]),
+        },
+        seen_at=(own.number,),
+        frequencies=each,
+    )
 
 
 def _mean(values: Sequence[Known]) -> Known:
     """Weighted with 1/std²; its deviation holds what the values scatter, too."""
-    weight = np.array([1.0 / max(v.std, 1e-12) ** 2 for v in values])
+    own = np.array([v.value for v in values])
+    weight = 1.0 / np.maximum([v.std for v in values], 1e-12) ** 2
     if not weight.sum() > 0.0:
-        return Known(float(np.mean([v.value for v in values])), np.inf)  # nothing of it is known
-    mean = float(weight @ [v.value for v in values] / weight.sum())
-    scatter = float(weight @ [(v.value - mean) ** 2 for v in values]) / max(len(values) - 1, 1)
+        return Known(float(own.mean()), np.inf)  # nothing of it is known
+    mean = float(weight @ own / weight.sum())
+    scatter = float(weight @ (own - mean) ** 2) / max(len(values) - 1, 1)
     return Known(mean, float(np.sqrt(max(scatter, 1.0) / weight.sum())))
 
 
-def _late(modes: Sequence[Modes], sample_time: float, held: bool, config: GroupingConfig) -> Known | None:
-    """The delay [s], where there is one, of either sign."""
+def _late(
+    modes: Sequence[Modes], sample_time: float, held: bool, config: GroupingConfig
+) -> Known | None:
+    """Return the delay [s], where there is one, of either sign."""
     mean = _mean([m.delay for m in modes])
-    least = (config.delay if held else 1.0) * sample_time
-    return mean if np.isfinite(mean.value) and abs(mean.value) >= max(least, config.sure * mean.std) else None
+    least = max((config.delay if held else 1.0) * sample_time, config.sure * mean.std)
+    return mean if np.isfinite(mean.value) and abs(mean.value) >= least else None
 
 
-def _early(joint: int, modes: Sequence[Modes], early: Known, config: GroupingConfig) -> Open:
-    flat = max(m.flat for m in modes)
-    other = "" if flat < config.flat else f", or a mode outside the excited band: the magnitude changes by a factor of {flat:.3g}"
-    return Open(joint, None, () if flat < config.flat else ("joint_elasticity", "base_resonance"),
-                f"The phase advances as with {-1e3 * early.value:.3g} ms of time gained. No lag does that: faster motion has "
-                f"folded back (aliasing), or torque and position have different clocks{other}.",
-                "all signals by one clock, at the controller's own rate")
+def _early(own: _Joint, early: Known) -> Open:
+    other, candidates = "", tuple[str, ...]()
+    if own.flat >= own.config.flat:
+        candidates = (_JOINT, _BASE)
+        other = ", or a mode outside the excited band: the magnitude changes by a factor of "
+        other += f"{own.flat:.3g}"
+    words = (
+        f"The phase advances as with {-1e3 * early.value:.3g} ms of time gained. No lag does that: "
+        "faster motion has folded back (aliasing), or torque and position have different clocks"
+        f"{other}."
+    )
+    ask = "all signals by one clock, at the controller's own rate"
+    return own.open(None, candidates, words, ask)
 
 
-def _delay(joint: int, modes: Sequence[Modes], sample_time: float, held: bool,
-           config: GroupingConfig) -> tuple[list[Finding], list[Open]]:
-    mean = _late(modes, sample_time, held, config)
-    if mean is None:
-        return [], []
-    each = f"{1e3 * mean.value:.3g} ± {2e3 * mean.std:.2g}"
-    flat = max(m.flat for m in modes)
-    if flat < config.flat:
-        words = (f"Beside its modes the magnitude is flat within {100.0 * (flat - 1.0):.2g} % and the phase falls in proportion to "
-                 f"the frequency: position comes {each} ms late in {_postures(modes)}, beyond hold and controller.")
-        return [Finding("delay", joint, words, "time_delay", None, None, {"delay": mean}, (joint,))], []
-    return [], [Open(joint, None, ("drive_lag", "time_delay", "torque_lag"),
-                     f"The phase falls as with {each} ms of delay, but the magnitude is not flat: a factor of {flat:.3g}.",
-                     "the measured motor current beside the command")]
+def _delay(own: _Joint, late: Known) -> Grouped:
+    each = f"{1e3 * late.value:.3g} ± {2e3 * late.std:.2g}"
+    if own.flat < own.config.flat:
+        words = (
+            f"Beside its modes the magnitude is flat within {100.0 * (own.flat - 1.0):.2g} % and "
+            f"the phase falls in proportion to the frequency: position comes {each} ms late in "
+            f"{own.postures}, beyond hold and controller."
+        )
+        seen, told = (own.number,), {"delay": late}
+        found = Finding("delay", own.number, words, "time_delay", parameters=told, seen_at=seen)
+        return [found], []
+    words = (
+        f"The phase falls as with {each} ms of delay, but the magnitude is not flat: a factor of "
+        f"{own.flat:.3g}."
+    )
+    ask = "the measured motor current beside the command"
+    return [], [own.open(None, ("drive_lag", "time_delay", "torque_lag"), words, ask)]
 
 
-def _in_all(modes: Sequence[Modes], config: GroupingConfig) -> list[Known]:
-    """Resonances of pairs that nearly cancel, at the same frequency in every posture: one alone is as likely noise."""
-    each = [[m.frequency for m in one.traces if m.kind == "resonance"] for one in modes]
-    return [first for first in each[0] if all(any(_same(first, one, config) for one in own) for own in each[1:])]
-
-
-def _scattered(joint: int, modes: Sequence[Modes], left: float, config: GroupingConfig) -> Open:
-    low, high = max(m.band[0] for m in modes), min(m.band[1] for m in modes)
-    return Open(joint, None, ("backlash", "joint_elasticity", "base_resonance"),
-                f"No mode is distinct from {low:.3g} to {high:.3g} Hz, but the response scatters by {100.0 * left:.2g} % about "
-                f"a linear plant's: whether it is flat within {100.0 * (config.flat - 1.0):.2g} %, or late, is not known. Noise "
-                "does so, and a gap that is crossed.", "longer, and excited more strongly")
-
-
-def _rigid(joint: int, modes: Sequence[Modes], config: GroupingConfig) -> Finding | Open:
-    flat, low, high = max(m.flat for m in modes), max(m.band[0] for m in modes), min(m.band[1] for m in modes)
+def _rigid(own: _Joint) -> Grouped:
+    config, (low, high) = own.config, own.band
     if high < config.span * low:
-        return Open(joint, None, ("joint_elasticity", "base_resonance"),
-                    f"No mode is distinct from {low:.3g} to {high:.3g} Hz; more than that the excitation does not tell.",
-                    "stronger excitation, to lower and higher frequencies")
-    if flat < config.flat:
-        traces = _in_all(modes, config) if len(modes) > 1 else []
-        beside = f" Pairs that nearly cancel recur at {_many(traces)} Hz: of a base, or of another joint." if traces else ""
-        words = (f"No {'distinct ' if traces else ''}mode from {low:.3g} to {high:.3g} Hz in {_postures(modes)}: the acceleration "
-                 f"per input is flat within {100.0 * (flat - 1.0):.2g} %, without delay.{beside}")
-        return Finding("rigid", joint, words, None, None, None, {}, (joint,))
-    return Open(joint, None, ("drive_lag", "joint_elasticity", "backlash"),
-                f"No mode is distinct, yet the acceleration per input changes by a factor of {flat:.3g}.",
-                "longer, with stronger excitation, and in a second posture")
+        words = (
+            f"No mode is distinct from {low:.3g} to {high:.3g} Hz; more than that the excitation "
+            "does not tell."
+        )
+        ask = "stronger excitation, to lower and higher frequencies"
+        return [], [own.open(None, (_JOINT, _BASE), words, ask)]
+    if own.flat >= config.flat:
+        words = (
+            "No mode is distinct, yet the acceleration per input changes by a factor of "
+            f"{own.flat:.3g}."
+        )
+        ask = "longer, with stronger excitation, and in a second posture"
+        return [], [own.open(None, ("drive_lag", _JOINT, "backlash"), words, ask)]
+    # pairs that nearly cancel, the same in every posture: one alone is as likely noise
+    each = [[m.frequency for m in one.traces if m.kind == "resonance"] for one in own.modes]
+    traces = [
+        first
+        for first in (each[0] if len(each) > 1 else [])
+        if all(any(_same(first, one, config) for one in rest) for rest in each[1:])
+    ]
+    kind, beside = "mode", ""
+    if traces:
+        kind = "distinct mode"
+        beside = f" Pairs that nearly cancel recur at {_many(traces)} Hz: of a base, or of another "
+        beside += "joint."
+    words = (
+        f"No {kind} from {low:.3g} to {high:.3g} Hz in {own.postures}: the acceleration per input "
+        f"is flat within {100.0 * (own.flat - 1.0):.2g} %, without delay.{beside}"
+    )
+    return [Finding("rigid", own.number, words, seen_at=(own.number,))], []
 
 
-def _open(joint: int, pairs: list[list[Pair]], why: str) -> Open:
-    first = min((p for own in pairs for p in own), key=lambda p: p.resonance.frequency.value)
-    return Open(joint, first.resonance.frequency, ("base_resonance", "joint_elasticity"),
-                f"{why[0].upper()}{why[1:]}.",
-                f"joint {joint} in a further posture of the other joints that changes its inertia by a tenth or more")
+def _which(own: _Joint, pairs: list[list[Pair]], why: str) -> Open:
+    """Ask whether base or joint is compliant."""
+    first = min((p.resonance.frequency for one in pairs for p in one), key=lambda f: f.value)
+    ask = f"joint {own.number} in a further posture of the other joints that changes its inertia "
+    words = f"{why[0].upper()}{why[1:]}."
+    return own.open(first, (_BASE, _JOINT), words, f"{ask}by a tenth or more")
 
 
-def _told(pairs: list[list[Pair]], inertia: Sequence[float], unit: str) -> str:
-    low = [p.antiresonance.frequency for own in pairs for p in own]
-    high = [p.resonance.frequency for own in pairs for p in own]
-    moved = ", ".join(f"{j:.3g}" for j in inertia)
-    return f"Antiresonance at {_many(low)} Hz, resonance at {_many(high)} Hz, with {moved} {unit} at the joint"
-
-
-def _postures(modes: Sequence[Modes]) -> str:
-    return "one posture" if len(modes) == 1 else f"{len(modes)} postures"
+def _told(own: _Joint, pairs: list[list[Pair]]) -> str:
+    low = [p.antiresonance.frequency for one in pairs for p in one]
+    high = [p.resonance.frequency for one in pairs for p in one]
+    moved = ", ".join(f"{j:.3g}" for j in own.inertia)
+    seen = f"Antiresonance at {_many(low)} Hz, resonance at {_many(high)} Hz"
+    return f"{seen}, with {moved} {own.unit} at the joint"
 
 
 def _many(values: Sequence[Known]) -> str:
     return ", ".join(f"{v.value:.4g}" for v in values)
 
 
-def seen_elsewhere(sure: Sequence[Finding], unsure: Sequence[Open],
-                   config: GroupingConfig | None = None) -> tuple[tuple[Finding, ...], tuple[Open, ...]]:
+def seen_elsewhere(
+    sure: Sequence[Finding], unsure: Sequence[Open], config: GroupingConfig | None = None
+) -> tuple[tuple[Finding, ...], tuple[Open, ...]]:
     """Where the base is known, what other joints show at its frequency is the base as well.
 
-    A base turns under the first joint before any other. What shows at one further joint alone, while another bends on a spring, may
-    be that spring, where it is faint or stands still where that spring would make it: its link swings against a motor that its own
-    controller, or friction, holds, and takes the motion away (a tuned absorber: Den Hartog 1934, chapter III).
+    A base turns under the first joint before any other. What shows at one further joint alone,
+    while another bends on a spring, may be that spring, where it is faint or stands still where that
+    spring would make it: its link swings against a motor that its own controller, or friction,
+    holds, and takes the motion away (a tuned absorber: Den Hartog 1934, chapter III).
     """
     config = config or GroupingConfig()
     rest = [one for one in sure if one.kind != "base"]
-    bent = [one for one in rest if one.kind == "joint"]
-    bases = [one for one in sure if one.kind == "base"]
     merged: list[Finding] = []
-    for one in bases:
-        same = next((k for k, m in enumerate(merged) if _same(m.frequency, one.frequency, config)), None)
-        if same is None:
+    for one in (one for one in sure if one.kind == "base"):
+        at = _place(merged, one.frequency, config)
+        if at is None:
             merged.append(one)
-        else:
-            both = merged[same]
-            merged[same] = replace(both, seen_at=(*both.seen_at, *one.seen_at), faint=both.faint and one.faint)
+            continue
+        seen_at = (*merged[at].seen_at, *one.seen_at)
+        merged[at] = replace(merged[at], seen_at=seen_at, faint=merged[at].faint and one.faint)
     left = []
     for one in [one for one in merged if len(one.seen_at) == 1 and one.seen_at != (1,)]:
-        others = [other for other in bent if other.joint != one.seen_at[0]]  # at its own joint a spring has a pair of its own
-        springs = [*(other for other in others if _absorbed(one, other, config)), *(others if one.faint else ())]
+        # at its own joint a spring has a pair of its own
+        bent = [b for b in rest if b.kind == "joint" and b.joint != one.seen_at[0]]
+        springs = [b for b in bent if _absorbed(one, b, config)] or (bent if one.faint else [])
         if springs:
             merged.remove(one)
             left.append(_trace(one, springs[0]))
     for question in unsure:
-        place = next((k for k, m in enumerate(merged) if "base_resonance" in question.candidates
-                      and _same(m.frequency, question.frequency, config)), None)
-        if place is None:
+        at = _place(merged, question.frequency, config) if _BASE in question.candidates else None
+        if at is None:
             left.append(question)
-        elif question.joint not in merged[place].seen_at:
-            merged[place] = replace(merged[place], seen_at=(*merged[place].seen_at, question.joint))
+        elif question.joint not in merged[at].seen_at:
+            merged[at] = replace(merged[at], seen_at=(*merged[at].seen_at, question.joint))
     return (*merged, *rest), tuple(left)
 
 
+def _place(bases: list[Finding], frequency: Known | None, config: GroupingConfig) -> int | None:
+    """Place of the base at this frequency."""
+    same = (k for k, one in enumerate(bases) if _same(one.frequency, frequency, config))
+    return next(same, None)
+
+
 def _absorbed(base: Finding, spring: Finding, config: GroupingConfig) -> bool:
-    """Return whether all that stands still for the base does so where the link behind the spring would swing."""
+    """Return whether all that stands still for the base does so where the spring's link swings."""
     own = spring.frequency
-    return own is not None and bool(base.stands) and \
-        all(abs(one.value - own.value) < config.locked * own.value for one in base.stands)
+    if own is None or not base.stands:
+        return False
+    return all(abs(one.value - own.value) < config.locked * own.value for one in base.stands)
 
 
 def _trace(base: Finding, spring: Finding) -> Open:
     joint = base.seen_at[0]
-    return Open(joint, base.frequency, ("base_resonance", "joint_elasticity"),
-                f"{base.evidence} But {'the pair is small, ' if base.faint else ''}it is sure at this joint alone, and it may be a "
-                f"trace of joint {spring.joint}, which bends.",
-                f"joint {spring.joint} made firm, or its brake closed, then joint {joint} again")
+    words = (
+        f"{base.evidence} But {'the pair is small, ' if base.faint else ''}it is sure at this "
+        f"joint alone, and it may be a trace of joint {spring.joint}, which bends."
+    )
+    ask = f"joint {spring.joint} made firm, or its brake closed, then joint {joint} again"
+    return Open(joint, base.frequency, (_BASE, _JOINT), words, ask)
 
 
 def _same(a: Known | None, b: Known | None, config: GroupingConfig) -> bool:

@@ -1,34 +1,40 @@
-"""A rational function through a frequency response: modes, plateaus and delay, each with its deviation.
+"""Fit a rational function to a frequency response: modes, level and delay with deviations.
 
-    H(s) = g s⁻ⁱ (held, sampled) e^(-s delay) · Π (1 + b s + a s²) [zeros] / Π (1 + b s + a s²) [poles]
+    H(s) = g e^(-s delay) · Π (1 + b s + a s²) [zeros] / Π (1 + b s + a s²) [poles]
 
-    found = fit_rational(frequency, response, variance, integrators=2, hold=1e-3, ...)    # rational_search.py
-    found.modes()                       resonances and antiresonances inside the band, by frequency
-    found.low, found.high               g below all modes, and what is left of it above them, g Π a_zeros / Π a_poles
-    found.delay                         [s], beside the hold
+    found = fit_rational(frequency, response, variance)
+    found.modes()                  resonances and antiresonances inside the band, by frequency
 
-Products of sections, with s in units of the middle of the band, keep the fit well conditioned at any order, and every section is
-a mode: ω = 1/√a, ζ = b / (2√a). g, a and b are positive: poles are stable and every damping is positive, as of a passive
-structure that is moved and measured at one place (all zeros of such a response are minimum phase, too). Maximum likelihood: the
-sum of |Ĝ - H|² / variance is smallest (Pintelon, Schoukens 2012, System Identification, §9.11); the number of sections is that
-of the shortest description (ibid. §11.3; Rissanen 1978, Automatica 14).
+Products of sections, with s in units of the middle of the band, keep the fit well conditioned at
+any order, and every section is a mode: ω = 1/√a, ζ = b / (2√a). g, a and b are positive: poles are
+stable and every damping is positive, as of a passive structure that is moved and measured at one
+place (all zeros of such a response are minimum phase, too). Maximum likelihood: the sum of
+|Ĝ - H|² / variance is smallest (Pintelon, Schoukens 2012, System Identification, §9.11); the number
+of sections is that of the shortest description (ibid. §11.3; Rissanen 1978, Automatica 14).
+
+From a bare gain and delay on, every step tries one more pair of poles at many frequencies and
+dampings, with the best numerator for each, which is linear in its coefficients, as in vector
+fitting (Gustavsen, Semlyen 1999, IEEE Trans. Power Delivery 14, p. 1052); the best few are refined
+by Gauss-Newton steps on all parameters (Levenberg 1944, Marquardt 1963).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
-__all__ = ["Array", "Complex", "Known", "Mode", "Rational", "known_part", "product"]
+from pipelines.errors import InputRejected
+from pipelines.frequency.config import RationalConfig
+from pipelines.frequency.spectra import Array, Complex
+from pipelines.io.results import NOT_STORED
 
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
+__all__ = ["FEWEST", "Known", "Mode", "Rational", "fit_rational", "scattered"]
 
-_CANCELS = 2.0  # standard deviations within which a resonance and an antiresonance are the same
+_CONFIG = RationalConfig()
+FEWEST = _CONFIG.fewest  # numerics: bins of a fit at least
 
 
 @dataclass(frozen=True)
@@ -46,108 +52,353 @@ class Mode:
     kind: Literal["resonance", "antiresonance"]
     frequency: Known  # undamped [Hz]
     damping: Known  # ratio [1]
-    distinct: bool  # False where one of the other kind takes it away within two standard deviations
+    # False where one of the other kind takes it away within two standard deviations
+    distinct: bool = field(default=True, metadata=NOT_STORED)
 
 
 @dataclass(frozen=True, eq=False)
 class Rational:
-    """A fitted function. `parameters`: log g, delay · unit, log b, log a of each zero section, then of each pole section."""
+    """A fitted function.
+
+    `parameters`: log g, delay · unit, log b, log a of each zero section, then of each pole section.
+    """
 
     parameters: Array  # (2 + 2 zeros + 2 poles,), s in `unit`
     covariance: Array  # of them; zero rows for what was held
     zeros: int  # sections
     poles: int
-    integrators: int
-    hold: float  # [s]; 0 for none
     unit: float  # [rad/s] of s
     band: tuple[float, float]  # [Hz] of the fit
-    misfit: float  # mean of |Ĝ - H|² / variance, over degrees of freedom: 1 where the model is right and the variance too
-    description: float  # length of the description, to compare numbers of sections on the same data
+    misfit: float = np.inf  # mean |Ĝ - H|² / variance: 1 where model and variance are right
+    description: float = np.inf  # length of the description, of the same data
 
     def response(self, frequency: Array) -> Complex:
         """H at these frequencies [Hz]."""
-        s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
-        value, _ = product(self.parameters, np.asarray(s / self.unit), self.zeros)
-        return np.asarray(value * known_part(s, self.integrators, self.hold))
-
-    @property
-    def low(self) -> Known:
-        """g: the plateau below all modes, of H sⁱ."""
-        value = float(np.exp(self.parameters[0]))
-        return Known(value, value * float(np.sqrt(self.covariance[0, 0])))
-
-    @property
-    def high(self) -> Known:
-        """g Π a_zeros / Π a_poles: the plateau above all modes, where there are as many zeros as poles; else (0, 0)."""
-        if self.zeros != self.poles:
-            return Known(0.0, 0.0)
-        sign = np.repeat([1.0, -1.0], [self.zeros, self.poles])
-        gradient = np.zeros(len(self.parameters))
-        gradient[0], gradient[3::2] = 1.0, sign
-        value = float(np.exp(gradient @ self.parameters))
-        return Known(value, value * float(np.sqrt(gradient @ self.covariance @ gradient)))
-
-    @property
-    def delay(self) -> Known:
-        """[s], beside that of the hold."""
-        return Known(float(self.parameters[1] / self.unit), float(np.sqrt(self.covariance[1, 1]) / self.unit))
+        s = np.asarray(2j * np.pi / self.unit * frequency, dtype=np.complex128)
+        return _product(self.parameters, s, self.zeros)[0]
 
     def modes(self, beyond: float = 1.0) -> tuple[Mode, ...]:
-        """Complex pairs whose frequency lies in the band of the fit, or up to `beyond` times its upper end."""
+        """Complex pairs with a frequency in the band, or up to `beyond` times its upper end."""
         found = [self._mode(k) for k in range(self.zeros + self.poles)]
-        inside = [m for m in found if m is not None and self.band[0] <= m.frequency.value <= beyond * self.band[1]]
-        cancelled = _cancelled(inside)
-        marked = [Mode(m.kind, m.frequency, m.damping, i not in cancelled) for i, m in enumerate(inside)]
+        low, high = self.band[0], beyond * self.band[1]
+        inside = [m for m in found if m is not None and low <= m.frequency.value <= high]
+        gone = _cancelled(inside)
+        marked = [replace(m, distinct=i not in gone) for i, m in enumerate(inside)]
         return tuple(sorted(marked, key=lambda m: m.frequency.value))
 
     def _mode(self, section: int) -> Mode | None:
-        """ω = 1/√a, ζ = b/(2√a); δω/ω = -δ(log a)/2, δζ/ζ = δ(log b) - δ(log a)/2. None for two real roots."""
+        """δω/ω = -δ(log a)/2, δζ/ζ = δ(log b) - δ(log a)/2. None for two real roots."""
         at = slice(2 + 2 * section, 4 + 2 * section)
         log_b, log_a = self.parameters[at]
-        c, damping = self.covariance[at, at], 0.5 * np.exp(log_b - 0.5 * log_a)
-        hertz = self.unit * np.exp(-0.5 * log_a) / (2.0 * np.pi)
+        c, damping = self.covariance[at, at], float(0.5 * np.exp(log_b - 0.5 * log_a))
         if damping >= 1.0:
             return None
+        hertz = float(self.unit * np.exp(-0.5 * log_a) / (2.0 * np.pi))
         gradient = damping * np.array([1.0, -0.5])
-        kind: Literal["resonance", "antiresonance"] = "antiresonance" if section < self.zeros else "resonance"
-        return Mode(kind, Known(float(hertz), float(hertz * 0.5 * np.sqrt(c[1, 1]))),
-                    Known(float(damping), float(np.sqrt(gradient @ c @ gradient))), True)
+        frequency = Known(hertz, hertz * 0.5 * float(np.sqrt(c[1, 1])))
+        own = Known(damping, float(np.sqrt(gradient @ c @ gradient)))
+        return Mode("antiresonance" if section < self.zeros else "resonance", frequency, own)
 
 
-def known_part(s: Complex, integrators: int, hold: float) -> Complex:
-    """s⁻ⁱ at s [rad/s] (bins,) of an input that is held between samples; as it is for hold = 0.
-
-    One or two integrators are sampled exactly, T / (z - 1) and T² (z + 1) / (2 (z - 1)²): what lies above half the rate folds
-    back, 1.6 % at a fifth of the rate. Otherwise the hold alone, (1 - e^(-sT)) / (s T).
-    """
-    if hold <= 0.0:
-        return np.asarray(s ** -float(integrators))
-    step = np.expm1(s * hold)  # z - 1
-    if integrators == 1:
-        return np.asarray(hold / step)
-    if integrators == 2:
-        return np.asarray(0.5 * hold**2 * (step + 2.0) / step**2)
-    return np.asarray(-np.expm1(-s * hold) / (s * hold) * s ** -float(integrators))
-
-
-def product(parameters: Array, s: Complex, zeros: int) -> tuple[Complex, Complex]:
-    """Everything that is fitted, at s in units of the fit (bins,), and each 1 + b s + a s² (sections, bins)."""
-    sections = 1.0 + np.exp(parameters[2::2, None]) * s + np.exp(parameters[3::2, None]) * s**2
-    value = np.exp(parameters[0] - s * parameters[1]) * np.prod(sections[:zeros], axis=0) / np.prod(sections[zeros:], axis=0)
-    return np.asarray(value), np.asarray(sections)
+def _product(parameters: Array, s: Complex, zeros: int) -> tuple[Complex, Complex]:
+    """H at s in units of the fit (bins,), and each 1 + b s + a s² (sections, bins)."""
+    b, a = np.exp(parameters[2::2, None]), np.exp(parameters[3::2, None])
+    sections = 1.0 + b * s + a * s**2
+    value = np.exp(parameters[0] - s * parameters[1]) * np.prod(sections[:zeros], axis=0)
+    return np.asarray(value / np.prod(sections[zeros:], axis=0)), np.asarray(sections)
 
 
 def _cancelled(modes: Sequence[Mode]) -> set[int]:
-    """Places of the modes that one of the other kind takes away, the nearest first, each at most one."""
+    """Places of the modes that one of the other kind takes away, the nearest first, each once."""
     gone: set[int] = set()
-    near = sorted((_apart(m, o), i, k) for i, m in enumerate(modes) for k, o in enumerate(modes[:i]) if o.kind != m.kind)
+    near = sorted(
+        (_apart(m, o), i, k)
+        for i, m in enumerate(modes)
+        for k, o in enumerate(modes[:i])
+        if o.kind != m.kind
+    )
     for apart, i, k in near:
-        if apart <= _CANCELS and not gone & {i, k}:
+        if apart <= _CONFIG.cancels and not gone & {i, k}:
             gone |= {i, k}
     return gone
 
 
 def _apart(m: Mode, other: Mode) -> float:
-    """The larger difference of frequency and damping, in standard deviations of it."""
-    return max(abs(x.value - y.value) / max(float(np.hypot(x.std, y.std)), 1e-300)
-               for x, y in ((m.frequency, other.frequency), (m.damping, other.damping)))
+    """Return the larger difference of frequency and damping, in standard deviations of it."""
+    pairs = ((m.frequency, other.frequency), (m.damping, other.damping))
+    return max(
+        abs(x.value - y.value) / max(float(np.hypot(x.std, y.std)), 1e-300) for x, y in pairs
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Data:
+    """The response to fit, the same for every order."""
+
+    s: Complex  # in `unit` (bins,)
+    target: Complex  # response (bins,)
+    weight: Array  # 1 / std of one of its two parts (bins,)
+    unit: float  # [rad/s]
+    band: tuple[float, float]  # [Hz]
+    with_delay: bool
+    correlated: float  # neighbouring bins that carry one independent estimate
+    freedom: float  # of the variance; infinite where it is known
+
+    @property
+    def independent(self) -> float:
+        """Bins that count."""
+        return len(self.s) / self.correlated
+
+
+def fit_rational(
+    frequency: Array,
+    response: Complex,
+    variance: Array,
+    with_delay: bool = True,
+    correlated: float = 1.0,
+    freedom: float = np.inf,
+) -> Rational:
+    """Return the rational function of the shortest description.
+
+    Args:
+        frequency: [Hz] (bins,), above 0.
+        response: (bins,).
+        variance: of it, E|Ĝ - G|² (bins,); bins without a finite one or response are left out.
+        with_delay: find one, positive or negative; else it is 0.
+        correlated: neighbouring bins that carry one independent estimate.
+        freedom: degrees of freedom of the variance; infinite where it is known.
+
+    Raises:
+        InputRejected: T08, fewer than 18 bins; D09, not one bin with a finite variance.
+    """
+    data = _prepare(frequency, response, variance, with_delay, correlated, freedom)
+    current = best = _rigid(data)
+    waited = 0
+    for order in range(1, _CONFIG.most + 1):
+        if 2 + 4 * order > data.independent:
+            break
+        square, fewer = _grow(data, current, True), _grow(data, current, False)
+        current = square
+        better = min((square, fewer, best), key=lambda one: one.description)
+        waited = 0 if better is not best else waited + 1
+        best = better
+        if waited >= _CONFIG.patience:
+            break
+    return best
+
+
+def scattered(model: Rational, frequency: Array, responses: Complex, variance: Array) -> Rational:
+    """Return the model with the covariance of its parameters from one of `responses` to the next.
+
+    Each of them (parts, bins) moves the parameters by one Gauss-Newton step from those of the fit;
+    `variance` (bins,) weighs the bins, as it did there.
+    """
+    data = _prepare(frequency, model.response(frequency), variance, True, 1.0, np.inf)
+    _, slope = _residual(data, model.parameters, model.zeros)
+    free = np.diag(model.covariance) > 0.0
+    own = np.ascontiguousarray(slope[free])
+    rest = (responses[:, np.isfinite(variance)] - data.target) * data.weight
+    steps = (np.conj(own) @ rest.T).real.T @ _inverse(_normal(own, np.ones(len(data.s))))
+    covariance = np.zeros_like(model.covariance)
+    covariance[np.ix_(free, free)] = np.cov(steps.T)
+    return replace(model, covariance=covariance)
+
+
+def _prepare(
+    frequency: Array,
+    response: Complex,
+    variance: Array,
+    with_delay: bool,
+    correlated: float,
+    freedom: float,
+) -> _Data:
+    good = np.isfinite(response) & np.isfinite(variance) & (frequency > 0.0) & (response != 0.0)
+    if not good.any():
+        remedy = "excite the frequencies that are asked for"
+        raise InputRejected("D09", "no frequency at which the response is known", remedy=remedy)
+    f, target = frequency[good], response[good]
+    if len(f) < FEWEST:
+        remedy = "record longer, or ask for a finer resolution or a wider band"
+        raise InputRejected("T08", f"{len(f)} frequencies are too few for a mode", remedy=remedy)
+    spread = variance[good] + (_CONFIG.floor**2 + _CONFIG.exact) * np.abs(target) ** 2
+    unit = float(2.0 * np.pi * np.sqrt(f[0] * f[-1]))
+    s = np.asarray(2j * np.pi / unit * f, dtype=np.complex128)
+    band, weight = (float(f[0]), float(f[-1])), np.sqrt(2.0 / spread)
+    return _Data(s, target, weight, unit, band, with_delay, correlated, freedom)
+
+
+def _rigid(data: _Data) -> Rational:
+    """Gain and delay alone, from no delay and from the one that brings most phases to zero."""
+    gain = float(np.median(np.log(np.abs(data.target))))
+    delays = [0.0]
+    if data.with_delay:
+        omega, turned = data.s.imag, data.target / np.abs(data.target)
+        grid = np.arange(-_CONFIG.delays, _CONFIG.delays + 1) * (0.25 * np.pi / omega[-1])
+        delays.append(float(grid[np.argmax((np.exp(1j * np.outer(grid, omega)) @ turned).real)]))
+    starts = [
+        Rational(np.array([gain, delay]), np.zeros((2, 2)), 0, 0, data.unit, data.band)
+        for delay in delays
+    ]
+    found = [*(_refine(data, one) for one in starts), *(_judged(data, one) for one in starts)]
+    # where modes tower over everything, the most likely gain alone is none: no place to go on from
+    near = [one for one in found if abs(one.parameters[0] - gain) < _CONFIG.leap]
+    return min(near, key=lambda one: one.description)
+
+
+def _residual(data: _Data, parameters: Array, zeros: int) -> tuple[Complex, Complex]:
+    """Residual (bins,) and Jacobian (parameters, bins), weighted.
+
+    ∂H/∂log b = ± H b s / section, ∂H/∂log a = ± H a s² / section.
+    """
+    value, sections = _product(parameters, data.s, zeros)
+    sign = np.where(np.arange(len(sections)) < zeros, 1.0, -1.0)[:, None]
+    slope = np.empty((len(parameters), len(data.s)), dtype=np.complex128)
+    slope[0], slope[1] = value, -data.s * value if data.with_delay else 0.0
+    shared = sign * value * data.s / sections
+    slope[2::2] = shared * np.exp(parameters[2::2, None])
+    slope[3::2] = shared * np.exp(parameters[3::2, None]) * data.s
+    return np.asarray((value - data.target) * data.weight), slope * data.weight
+
+
+def _cost(rest: Complex, freedom: float) -> tuple[float, Array]:
+    """-2 log-likelihood, and the weights (bins,) with which least squares lowers it.
+
+    Where the variance is itself an estimate with ν degrees of freedom, u = |Ĝ - H|² / variance is
+    F-distributed, and the sum is Σ 2 (ν + 1) log(1 + u / ν), weights (ν + 1) / (ν + u); with ν = ∞
+    it is Σ 2 u, weights 1.
+    """
+    twice = rest.real**2 + rest.imag**2
+    if not np.isfinite(freedom):
+        return float(twice.sum()), np.ones(len(rest))
+    u = 0.5 * twice
+    cost = float(2.0 * (freedom + 1.0) * np.log1p(u / freedom).sum())
+    return cost, np.asarray((freedom + 1.0) / (freedom + u))
+
+
+def _refine(data: _Data, start: Rational) -> Rational:
+    """Find the most likely parameters nearby: by least squares, then with the variance's freedom."""
+    p = _descend(data, start, np.inf, *_CONFIG.fine)
+    if np.isfinite(data.freedom):
+        p = _descend(data, replace(start, parameters=p), data.freedom, *_CONFIG.fine)
+    return _judged(data, replace(start, parameters=p))
+
+
+def _descend(data: _Data, start: Rational, freedom: float, steps: int, stop: float) -> Array:
+    """Gauss-Newton steps, shortened until the cost decreases."""
+    p, damping = start.parameters, 1e-3
+    with np.errstate(all="ignore"):
+        rest, slope = _residual(data, p, start.zeros)
+        cost, w = _cost(rest, freedom)
+        for _ in range(steps):
+            normal, gradient = _normal(slope, w), (np.conj(slope) @ (w * rest)).real
+            scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
+            matrix, before = normal / np.outer(scale, scale), cost
+            while damping < _CONFIG.stiffest:
+                step = np.linalg.solve(matrix + damping * np.eye(len(p)), gradient / scale) / scale
+                tried, its_slope = _residual(data, p - step, start.zeros)
+                its_cost, its_w = _cost(tried, freedom)
+                if its_cost < cost and np.abs(np.delete(step, 1)).max() < _CONFIG.leap:
+                    p, rest, slope, cost, w = p - step, tried, its_slope, its_cost, its_w
+                    damping = max(damping / 10.0, 1e-12)
+                    break
+                damping *= 4.0
+            if not before - cost > stop * before:
+                break
+    return p
+
+
+def _normal(slope: Complex, w: Array) -> Array:
+    """Re J W Jᴴ, of real and imaginary part side by side."""
+    both = slope.view(np.float64)
+    return np.asarray((both * np.repeat(w, 2)) @ both.T)
+
+
+def _inverse(normal: Array) -> Array:
+    """Of a symmetric matrix whose rows have different units."""
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    both = np.outer(scale, scale)
+    return np.asarray(np.linalg.pinv(normal / both, rcond=1e-14, hermitian=True) / both)
+
+
+def _judged(data: _Data, model: Rational) -> Rational:
+    """Covariance and length of the description, -2 log-likelihood + k log n.
+
+    The information of a bin whose variance has ν degrees of freedom is ν / (ν + 2) of what its
+    weight says. The covariance is wider where bins are correlated, or the model does not fit.
+    """
+    rest, slope = _residual(data, model.parameters, model.zeros)
+    cost, w = _cost(rest, data.freedom)
+    free = np.ones(len(model.parameters), dtype=bool)
+    free[1] = data.with_delay
+    count = float(free.sum())
+    misfit = float((w * np.abs(rest) ** 2).sum()) / max(2.0 * len(data.s) - count, 1.0)
+    normal = _normal(slope[free], w)
+    if not np.isfinite(normal).all():
+        return model  # poles on a measured frequency, or beyond all numbers: no shorter description
+    wider = data.correlated * max(misfit, 1.0) * (1.0 + 2.0 / data.freedom)
+    covariance = np.zeros((len(free), len(free)))
+    covariance[np.ix_(free, free)] = _inverse(normal) * wider
+    description = cost / data.correlated + count * float(np.log(2.0 * data.independent))
+    return replace(model, covariance=covariance, misfit=misfit, description=description)
+
+
+def _grow(data: _Data, model: Rational, with_zeros: bool) -> Rational:
+    """One more pair of poles, and one of zeros or none: the best of the trials, refined."""
+    value, _ = _product(model.parameters, data.s, model.zeros)
+    weight, ratio = (data.weight * np.abs(value)) ** 2, data.target / value
+    frequencies = np.abs(data.s[:: max(1, len(data.s) // _CONFIG.frequencies)])
+    a = np.repeat(1.0 / frequencies**2, len(_CONFIG.dampings))
+    b = (2.0 * np.array(_CONFIG.dampings) / frequencies[:, None]).ravel()
+    gain, zero, gained = _numerators(np.abs(data.s), weight, ratio, (a, b), with_zeros)
+    found, between = [], 2 + 2 * model.zeros
+    for k in _separate(gained, len(_CONFIG.dampings)):
+        pole = np.array([b[k], a[k]])
+        # a best numerator may be none that is passive
+        own = np.log(np.maximum(zero[k], _CONFIG.smallest * pole[: len(zero[k])]))
+        base = model.parameters[:2] + np.array([np.log(gain[k]), 0.0])
+        before, after = model.parameters[2:between], model.parameters[between:]
+        p = np.concatenate([base, before, own, after, np.log(pole)])
+        zeros, poles = model.zeros + int(with_zeros), model.poles + 1
+        started = replace(model, parameters=p, zeros=zeros, poles=poles)
+        p = _descend(data, started, np.inf, *_CONFIG.rough)
+        found.append(_judged(data, replace(started, parameters=p)))
+    return _refine(data, min(found, key=lambda one: one.description))
+
+
+def _numerators(
+    omega: Array, weight: Array, ratio: Complex, poles: tuple[Array, Array], with_zeros: bool
+) -> tuple[Array, Array, Array]:
+    """min Σ weight |ratio - (c + d s + e s²) / (1 + b s + a s²)|² for every a, b; real c, d, e.
+
+    Without zeros c alone. At s = jω the normal equations of d stand apart from those of c and e.
+    Gives c, (d, e) / c, and what the sum loses; that is -1 where c is not positive.
+    """
+    a, b = poles
+    below = 1.0 / ((1.0 - a[:, None] * omega**2) + 1j * (b[:, None] * omega))  # (trials, bins)
+    powers = weight[:, None] * np.stack([omega**0, omega**2, omega**4], axis=1)
+    power = (below.real**2 + below.imag**2) @ powers
+    seen = below * (weight * np.conj(ratio))
+    right = np.stack([seen.real.sum(axis=1), -seen.imag @ omega, -seen.real @ omega**2], axis=1)
+    if not with_zeros:
+        c = right[:, 0] / power[:, 0]
+        gained = np.where(c > 0.0, c * right[:, 0], -1.0)
+        return np.where(c > 0.0, c, 1.0), np.zeros((len(a), 0)), gained
+    determinant = power[:, 0] * power[:, 2] - power[:, 1] ** 2
+    c = (power[:, 2] * right[:, 0] + power[:, 1] * right[:, 2]) / determinant
+    e = (power[:, 0] * right[:, 2] + power[:, 1] * right[:, 0]) / determinant
+    d = right[:, 1] / power[:, 1]
+    gained = c * right[:, 0] + d * right[:, 1] + e * right[:, 2]
+    safe = np.where(c > 0.0, c, 1.0)
+    return safe, np.stack([d, e], axis=1) / safe[:, None], np.where(c > 0.0, gained, -1.0)
+
+
+def _separate(gained: Array, dampings: int) -> list[int]:
+    """Return the best trial, and the best of those that do not neighbour it."""
+    best = gained.reshape(-1, dampings)
+    order = np.argsort(-best.max(axis=1))
+    chosen: list[int] = []
+    for k in order.tolist():
+        far = all(abs(k - j) > max(3, len(order) // 30) for j in chosen)
+        if len(chosen) < _CONFIG.refined and far:
+            chosen.append(k)
+    return [k * dampings + int(best[k].argmax()) for k in chosen]

@@ -1,28 +1,108 @@
-"""Spectra and cross spectra of signals measured together, averaged over overlapping segments, and the responses they give.
+"""Frequency responses with variance and coherence: averaged spectra, and ways out of a loop.
 
-    spectra = cross_spectra((x,), rate, segment)        x (samples, channels); every segment of every channel is transformed once
-    spectra.density[:, 0, 1]                            Φ_01, as scipy.signal.csd(x[:, 0], x[:, 1])
-    spectra.responses(0, (1, 2))                        H₁ from channel 0 to channels 1 and 2, with covariance and coherence
+    an excitation v enters a loop; an input r and an output q of the plant are measured
 
-Welch 1967, IEEE Trans. Audio 15, p. 70; Bendat, Piersol 2010, Random Data, ch. 6 and 9.
+    several = cross_spectra(stretches, rate, segment).responses(0, (1, 2))    v → (r, q)
+    plant   = closed_loop(several, output=1, input=0)      P = G_vq / G_vr, without the controller
+    plant   = indirect(several.of(0), controller)          P = (1 - S) / (C S), S = G_vr, eq. (29)
+    band    = excited_band(several, density)               where v tells anything of the plant
+
+Equations (28), (29): Kostić et al. 2004. Variances: Pintelon, Schoukens 2012, System
+Identification, ch. 2 and 7. Spectra: Welch 1967, IEEE Trans. Audio 15, p. 70; Bendat, Piersol
+2010, Random Data, ch. 6 and 9.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.frequency.frequency_response import Array, Complex, Responses
+from pipelines.frequency.config import BandConfig
 
-__all__ = ["CrossSpectra", "cross_spectra", "welch_responses"]
+__all__ = ["Array", "Complex", "CrossSpectra", "ExcitedBand", "FrequencyResponse", "Responses"]
+__all__ += ["bands_below", "closed_loop", "cross_spectra", "excited_band", "indirect", "powered"]
 
-_CACHE = 1 << 16  # numbers that are worked on at a time, so that they stay near the processor
-_HANN_OVERLAP = 1.0 / 18.0  # twice the squared correlation of neighbouring segments that overlap by half: 2 (1/6)²
-_HANN_BINS = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0)  # neighbouring bins of Hann's window correlate by 2/3 and 1/6; their squares
-_HANN_WIDTH = 1.5  # equivalent noise bandwidth in bins
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+Mask = npt.NDArray[np.bool_]
+
+_AT_ONCE = 1 << 16  # numerics: values worked on at a time, so that they stay near the processor
+_HANN_OVERLAP = 1.0 / 18.0  # numerics: twice the squared correlation 1/6 of half overlapping parts
+_HANN_BINS = 1.0 + 17.0 / 18.0  # numerics: neighbouring bins correlate by 2/3 and 1/6
+_HANN_WIDTH = 1.5  # numerics: equivalent noise bandwidth in bins
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponse:
+    """One response, input → output."""
+
+    frequency: Array  # [Hz] (bins,)
+    response: Complex  # [unit of output / unit of input] (bins,)
+    variance: Array  # E|Ĝ - G|², real and imaginary part together (bins,)
+    coherence: Array  # 0 … 1 (bins,); for a quotient the lower of its two
+    method: str  # "welch", "local polynomial", "multisine"
+    resolution: float  # [Hz] width of what one estimate looks at
+    averages: float  # independent averages in one estimate
+    correlated: float  # neighbouring bins that carry one independent estimate, at least 1
+    freedom: float = np.inf  # degrees of freedom of the variance
+
+    def within(self, low: float, high: float) -> FrequencyResponse:
+        """Return the bins with low ≤ frequency ≤ high [Hz]."""
+        return self.where((self.frequency >= low) & (self.frequency <= high))
+
+    def where(self, kept: Mask) -> FrequencyResponse:
+        """Return the bins that are `kept` (bins,)."""
+        names = ("frequency", "response", "variance", "coherence")
+        return replace(self, **{name: getattr(self, name)[kept] for name in names})
+
+    def times(self, factor: Complex) -> FrequencyResponse:
+        """Return the response times a `factor` (bins,) that is exactly known."""
+        variance = self.variance * np.abs(factor) ** 2
+        return replace(self, response=self.response * factor, variance=variance)
+
+
+@dataclass(frozen=True, eq=False)
+class Responses:
+    """From one excitation to several outputs measured together, whose errors are correlated."""
+
+    frequency: Array  # [Hz] (bins,)
+    response: Complex  # (bins, outputs)
+    covariance: Complex  # E (Ĝ - G)(Ĝ - G)ᴴ (bins, outputs, outputs)
+    coherence: Array  # of the excitation with each output (bins, outputs)
+    method: str
+    resolution: float  # [Hz]
+    averages: float
+    correlated: float
+    freedom: float = np.inf
+
+    @property
+    def variance(self) -> Array:
+        """(bins, outputs)."""
+        return np.diagonal(self.covariance, axis1=1, axis2=2).real
+
+    def of(self, output: int) -> FrequencyResponse:
+        """Return the response of one output."""
+        spread = self.covariance[:, output, output].real
+        return FrequencyResponse(
+            self.frequency,
+            self.response[:, output],
+            spread,
+            self.coherence[:, output],
+            self.method,
+            self.resolution,
+            self.averages,
+            self.correlated,
+            self.freedom,
+        )
+
+    def where(self, kept: Mask) -> Responses:
+        """Return the bins that are `kept` (bins,)."""
+        names = ("frequency", "response", "covariance", "coherence")
+        return replace(self, **{name: getattr(self, name)[kept] for name in names})
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,18 +113,13 @@ class CrossSpectra:
     density: Complex  # Φ_ab = E conj(X_a) X_b [unit_a unit_b / Hz] (bins, channels, channels)
     segments: int
 
-    @property
-    def averages(self) -> float:
-        """Independent segments that would average as well; those that overlap by half correlate a little."""
-        return self.segments / (1.0 + _HANN_OVERLAP * (self.segments - 1) / self.segments)
-
     def coherence(self, a: int, b: int) -> Array:
         """Γ² = |Φ_ab|² / (Φ_aa Φ_bb), eq. (28), (bins,); 0 where a channel is still.
 
         Raises:
             InputRejected: T08, one segment alone: it is 1 whatever the signals are.
         """
-        if self.segments < 2:
+        if self.segments <= 1:
             raise _too_short("one segment alone says nothing of coherence or variance")
         power = self.density[:, a, a].real * self.density[:, b, b].real
         found = np.abs(self.density[:, a, b]) ** 2 / np.where(power > 0.0, power, 1.0)
@@ -53,107 +128,186 @@ class CrossSpectra:
     def responses(self, source: int, outputs: Sequence[int]) -> Responses:
         """H₁ = Φ_xz / Φ_xx from channel `source` to each of `outputs`, at every frequency above 0.
 
-        The covariance is that of the noise of the outputs, Φ_zz - Φ_zx Φ_xz / Φ_xx, which takes one degree of freedom, over
-        averages and power of the source. Leakage is not in it: the same at every segment, it hides in the response.
+        The covariance is that of the noise of the outputs, Φ_zz - Φ_zx Φ_xz / Φ_xx, which takes
+        one degree of freedom, over averages and power of the source. Leakage is not in it: the
+        same at every segment, it hides in the response.
 
         Raises:
-            InputRejected: T08, fewer than two segments; D09, a source without power at some frequency.
+            InputRejected: T08, fewer than two segments; D09, a source without power somewhere.
         """
         z = list(outputs)
         coherence = np.stack([self.coherence(source, k) for k in z], axis=1)[1:]
         power, cross = self.density[1:, source, source].real, self.density[1:, source, z]
         if not (power > 0.0).all():
-            raise InputRejected("D09", f"the excitation has no power at {self.frequency[1:][power <= 0.0][0]:.4g} Hz",
-                                remedy="excite every frequency that is asked for")
+            at = self.frequency[1:][power <= 0.0][0]
+            remedy = "excite every frequency that is asked for"
+            raise InputRejected("D09", f"the excitation has no power at {at:.4g} Hz", remedy=remedy)
         response = cross / power[:, None]
         own = np.swapaxes(self.density[1:][:, z][:, :, z], 1, 2)  # E Z Zᴴ
-        noise = own - response[:, :, None] * np.conj(response)[:, None, :] * power[:, None, None]
-        n = self.averages
-        return Responses(self.frequency[1:], response, noise / ((n - 1.0) * power)[:, None, None], coherence, "welch",
-                         _HANN_WIDTH * float(self.frequency[1]), n, _HANN_BINS, n - 1.0)
+        explained = response[:, :, None] * np.conj(response)[:, None, :] * power[:, None, None]
+        # segments that overlap by half correlate a little
+        n = self.segments / (1.0 + _HANN_OVERLAP * (self.segments - 1) / self.segments)
+        covariance = (own - explained) / ((n - 1.0) * power)[:, None, None]
+        width = _HANN_WIDTH * float(self.frequency[1])
+        kind = ("welch", width, n, _HANN_BINS, n - 1.0)
+        return Responses(self.frequency[1:], response, covariance, coherence, *kind)
 
 
 def cross_spectra(stretches: Sequence[Array], rate: float, segment: int) -> CrossSpectra:
-    """Averaged over half overlapping segments of `segment` samples under Hann's window, the mean of each taken off.
+    """Average over half overlapping segments under Hann's window, the mean of each taken off.
 
     Args:
-        stretches: of one experiment or several, each (samples, channels); what is shorter than a segment is left out.
+        stretches: each (samples, channels); what is shorter than a segment is left out.
         rate: samples a second [Hz]; the bins lie rate/segment apart.
+        segment: samples.
 
     Raises:
         InputRejected: T08, no stretch holds a segment; D01, missing samples.
     """
-    channels = _checked(stretches, segment)
-    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(segment) / segment)
-    sums = _Sums(channels, segment // 2 + 1)
-    for stretch in stretches:
-        if len(stretch) < segment:
-            continue
-        rows = np.ascontiguousarray(np.asarray(stretch, dtype=np.float64).T)
-        pieces = np.lib.stride_tricks.sliding_window_view(rows, segment, axis=1)[:, ::segment - segment // 2]
-        at_once = max(1, _CACHE // (channels * segment))
-        for first in range(0, pieces.shape[1], at_once):
-            piece = pieces[:, first:first + at_once]
-            piece = piece - piece.mean(axis=-1, keepdims=True)
-            piece *= window
-            sums.add(np.fft.rfft(piece, axis=-1))
-    total = sums.matrix() * (2.0 / (sums.segments * rate * (window**2).sum()))
-    total[0] *= 0.5
-    if segment % 2 == 0:
-        total[-1] *= 0.5
-    return CrossSpectra(np.asarray(np.fft.rfftfreq(segment, 1.0 / rate), dtype=np.float64), total, sums.segments)
-
-
-class _Sums:
-    """Σ conj(X_a) X_b over segments: real on the diagonal, and each pair once."""
-
-    def __init__(self, channels: int, bins: int) -> None:
-        self.segments = 0
-        self.pairs = [(a, b) for a in range(channels) for b in range(a + 1, channels)]
-        self.own = np.zeros((channels, bins, 2))  # of real and imaginary part
-        self.cross = np.zeros((len(self.pairs), bins), dtype=np.complex128)
-
-    def add(self, x: Complex) -> None:
-        """Those of x (channels, segments, bins)."""
-        parts = x.view(np.float64).reshape(*x.shape, 2)
-        self.own += np.einsum("csfp,csfp->cfp", parts, parts)
-        for k, (a, b) in enumerate(self.pairs):
-            product = np.conj(x[a])
-            product *= x[b]
-            self.cross[k] += product.sum(axis=0)
-        self.segments += x.shape[1]
-
-    def matrix(self) -> Complex:
-        """(bins, channels, channels)."""
-        channels, bins = self.own.shape[:2]
-        whole = np.zeros((bins, channels, channels), dtype=np.complex128)
-        whole[:, np.arange(channels), np.arange(channels)] = self.own.sum(axis=2).T
-        for k, (a, b) in enumerate(self.pairs):
-            whole[:, a, b] = self.cross[k]
-            whole[:, b, a] = np.conj(self.cross[k])
-        return whole
-
-
-def welch_responses(stretches: Sequence[Array], rate: float, segment: int, source: int = 0,
-                    outputs: Sequence[int] = (1, 2)) -> Responses:
-    """From channel `source` to `outputs`, see `cross_spectra` and `CrossSpectra.responses`."""
-    return cross_spectra(stretches, rate, segment).responses(source, outputs)
-
-
-def _checked(stretches: Sequence[Array], segment: int) -> int:
-    """How many channels every stretch has."""
-    if segment < 4:
+    if segment < BandConfig().shortest:
         raise UsageError("C02", f"segments of {segment} samples", remedy="give at least four")
     longest = max((len(x) for x in stretches), default=0)
     if longest < segment:
         raise _too_short(f"the longest stretch has {longest} samples, one segment {segment}")
     if not all(np.isfinite(x).all() for x in stretches):
-        raise InputRejected("D01", "missing samples in a signal whose spectrum is asked for", remedy="cut the log at its gaps")
-    counts = {int(x.shape[1]) for x in stretches}
-    if len(counts) != 1:
-        raise UsageError("C02", f"stretches of {sorted(counts)} channels", remedy="give all the same channels")
-    return counts.pop()
+        raise missing_samples("spectrum")
+    channels, count = stretches[0].shape[1], 0
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(segment) / segment)
+    total = np.zeros((channels, channels, segment // 2 + 1), dtype=np.complex128)
+    at_once = max(1, _AT_ONCE // (channels * segment))
+    for stretch in stretches:
+        if len(stretch) < segment:
+            continue
+        x = np.ascontiguousarray(np.asarray(stretch, dtype=np.float64).T)
+        pieces = np.lib.stride_tricks.sliding_window_view(x, segment, axis=1)
+        pieces = pieces[:, :: segment - segment // 2]
+        count += pieces.shape[1]
+        for first in range(0, pieces.shape[1], at_once):
+            piece = pieces[:, first : first + at_once]
+            piece = piece - piece.mean(axis=-1, keepdims=True)
+            piece *= window
+            z = np.fft.rfft(piece, axis=-1)
+            for a in range(channels):
+                parts = z[a].view(np.float64).reshape(*z[a].shape, 2)
+                total[a, a] += np.einsum("sfp,sfp->f", parts, parts)
+                for b in range(a + 1, channels):
+                    product = np.conj(z[a])
+                    product *= z[b]
+                    total[a, b] += product.sum(axis=0)
+    total *= 2.0 / (count * rate * (window**2).sum())
+    total[:, :, 0] *= 0.5
+    if segment % 2 == 0:
+        total[:, :, -1] *= 0.5
+    rows, columns = np.tril_indices(channels, -1)
+    total[rows, columns] = np.conj(total[columns, rows])
+    frequency = np.asarray(np.fft.rfftfreq(segment, 1.0 / rate), dtype=np.float64)
+    return CrossSpectra(frequency, np.ascontiguousarray(np.moveaxis(total, 2, 0)), count)
 
 
 def _too_short(why: str) -> InputRejected:
     return InputRejected("T08", why, remedy="record longer, or ask for a coarser resolution")
+
+
+def missing_samples(what: str) -> InputRejected:
+    """D01: a spectrum needs all of a signal."""
+    words = f"missing samples in a signal whose {what} is asked for"
+    return InputRejected("D01", words, remedy="cut the log at its gaps")
+
+
+def closed_loop(responses: Responses, output: int = 1, input: int = 0) -> FrequencyResponse:
+    """P = G_v,output / G_v,input (bins,): no controller, no bias by other drives of the loop.
+
+    P̂ - P ≈ (δ_out - P δ_in) / G_in; ibid., eq. (2-73). Where G_in is zero or unknown the response
+    is NaN, its variance infinite, its coherence 0.
+    """
+    g_out, g_in = responses.response[:, output], responses.response[:, input]
+    c = responses.covariance
+    there = np.isfinite(g_in) & np.isfinite(g_out) & np.isfinite(c.real).all(axis=(1, 2))
+    there &= g_in != 0.0
+    safe, c = np.where(there, g_in, 1.0), np.where(there[:, None, None], c, 0.0)
+    plant = np.where(there, g_out, 0.0) / safe
+    spread = c[:, output, output].real + np.abs(plant) ** 2 * c[:, input, input].real
+    spread -= 2.0 * (np.conj(plant) * c[:, output, input]).real
+    variance = np.where(there, np.maximum(spread, 0.0) / np.abs(safe) ** 2, np.inf)
+    lower = np.minimum(responses.coherence[:, output], responses.coherence[:, input])
+    return replace(
+        responses.of(output),
+        response=np.where(there, plant, np.nan),
+        variance=variance,
+        coherence=np.where(there, lower, 0.0),
+    )
+
+
+def indirect(sensitivity: FrequencyResponse, controller: Complex) -> FrequencyResponse:
+    """P = (1 - S) / (C S), eq. (29), with the controller's own response C (bins,).
+
+    C is that of the sampled controller: with the continuous one the error is 8.8 % at 28 Hz, 25 %
+    at 80 Hz (1 kHz, kp = 400, kd = 28). |∂P/∂S| = 1 / |C S²|.
+    """
+    there = np.isfinite(sensitivity.response) & (sensitivity.response != 0.0)
+    there &= controller != 0.0
+    s, c = np.where(there, sensitivity.response, 1.0), np.where(there, controller, 1.0)
+    return replace(
+        sensitivity,
+        response=np.where(there, (1.0 - s) / (c * s), np.nan),
+        variance=np.where(there, sensitivity.variance / np.abs(c * s**2) ** 2, np.inf),
+        coherence=np.where(there, sensitivity.coherence, 0.0),
+    )
+
+
+def bands_below(
+    frequency: Array, coherence: Array, limit: float
+) -> tuple[tuple[float, float], ...]:
+    """Return stretches [Hz] of bins whose coherence is under the limit, or unknown: (from, to)."""
+    low = np.concatenate([[False], ~(coherence >= limit), [False]])
+    first, end = np.flatnonzero(low[1:] != low[:-1]).reshape(-1, 2).T
+    return tuple(zip(frequency[first].tolist(), frequency[end - 1].tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class ExcitedBand:
+    """Where responses exist, lowest interval first; none where the excitation says nothing."""
+
+    intervals: tuple[tuple[float, float], ...]  # [Hz]
+
+    def holds(self, frequency: Array) -> Mask:
+        """Return a mask of the `frequency` [Hz] (any shape) that lie in an interval."""
+        inside = np.zeros(np.shape(frequency), dtype=bool)
+        for low, high in self.intervals:
+            inside |= (frequency >= low) & (frequency <= high)
+        return inside
+
+
+def excited_band(responses: Responses, density: Array) -> ExcitedBand:
+    """Find the intervals in which v has power and all its responses are known.
+
+    v is the instrument (Söderström, Stoica 1989, System Identification, ch. 8): P = G_vq / G_vu is
+    unbiased in a loop as long as G_vu is well above its own noise. From ten decibels on the bias
+    of the quotient is below exp(-10) of it (Pintelon, Schoukens 2012, §2.4).
+
+    Args:
+        responses: from v to input and output of the plant, by frequency.
+        density: of v [unit²/Hz] at their frequencies (bins,).
+    """
+    config, f = BandConfig(), responses.frequency
+    if len(f) < config.fewest or not float(density.sum()) > 0.0:
+        return ExcitedBand(())
+    with np.errstate(all="ignore"):
+        ratio = np.abs(responses.response) ** 2 / responses.variance
+    known = np.nan_to_num(ratio, nan=0.0).min(axis=1)
+    first = np.searchsorted(f, f * (1.0 - config.around))
+    last = np.searchsorted(f, f * (1.0 + config.around), side="right")
+    usual = np.array([np.median(known[a:b]) for a, b in zip(first, last, strict=True)])
+    good = np.flatnonzero(powered(density) & (usual >= config.known))
+    if not len(good):
+        return ExcitedBand(())
+    times, share = config.hole
+    widest = np.maximum(times * float(np.median(np.diff(f))), share * f[good[:-1]])
+    parts = np.split(good, np.flatnonzero(np.diff(f[good]) > widest) + 1)
+    long = [p for p in parts if len(p) >= config.fewest]
+    return ExcitedBand(tuple((float(f[p[0]]), float(f[p[-1]])) for p in long))
+
+
+def powered(density: Array) -> Mask:
+    """Return a mask of the bins with power of v, by its `density` [unit²/Hz] (bins,), not all 0."""
+    return np.asarray(density > BandConfig().power * float(density @ density) / density.sum())

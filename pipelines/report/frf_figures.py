@@ -7,18 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.frequency.controller import Complex
-from pipelines.frequency.excited_band import ExcitedBand
-from pipelines.frequency.responses import double_integrator
+from pipelines.frequency.controller import double_integrator
+from pipelines.frequency.rational import Mode
 from pipelines.frequency.result import (
     COHERENCE,
     Band,
     Curve,
     Method,
-    ModeFound,
     Posture,
     same_bins,
 )
+from pipelines.frequency.spectra import Complex, ExcitedBand
 from pipelines.report import style
 from pipelines.report.figures import Array, Look, joint_colour, one_figure
 from pipelines.report.report import Figure
@@ -151,7 +150,7 @@ def _phase(value: Complex) -> Array:
     return np.asarray(np.rad2deg(np.angle(-value)) - 180.0)
 
 
-def mark_modes(axes: Sequence[Axes], modes: Sequence[ModeFound]) -> None:
+def mark_modes(axes: Sequence[Axes], modes: Sequence[Mode]) -> None:
     for mode in modes:
         line = "-" if mode.kind == "resonance" else "--"
         look: Look = {"color": style.VERMILLION, "linewidth": 0.8, "linestyle": line, "zorder": 0.5}

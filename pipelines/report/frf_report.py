@@ -8,8 +8,9 @@ from functools import partial
 import numpy as np
 
 from pipelines.errors import Check
+from pipelines.frequency.grouping import Finding, Open
 from pipelines.frequency.rational import Known
-from pipelines.frequency.result import Classified, Method, Posture, Undecided
+from pipelines.frequency.result import Method, Posture
 from pipelines.report.frf_figures import (
     bode_figure,
     compliance_figure,
@@ -43,8 +44,8 @@ _say, _paragraphs = partial(sentence, "frf"), partial(paragraphs, "frf")
 def frf_report(
     responses: Sequence[Method],
     postures: Sequence[Posture],
-    classification: Sequence[Classified],
-    undecided: Sequence[Undecided],
+    classification: Sequence[Finding],
+    undecided: Sequence[Open],
     doctor: Sequence[Check],
     drawn: Sequence[int],
 ) -> Report:
@@ -67,7 +68,7 @@ def _methods(posture: Posture, responses: Sequence[Method]) -> Responses:
     return {m.method: m for m in own}
 
 
-def _verdict(sure: Sequence[Classified], unsure: Sequence[Undecided], gates: list[str]) -> str:
+def _verdict(sure: Sequence[Finding], unsure: Sequence[Open], gates: list[str]) -> str:
     found = []
     for one in sure:
         if one.kind != "rigid":
@@ -80,11 +81,11 @@ def _verdict(sure: Sequence[Classified], unsure: Sequence[Undecided], gates: lis
     return _say("verdict", gates, found, rigid, undecided)
 
 
-def _candidates(one: Undecided) -> str:
+def _candidates(one: Open) -> str:
     return " or ".join(cause.replace("_", " ") for cause in one.candidates)
 
 
-def _frequency(one: Classified) -> str:
+def _frequency(one: Finding) -> str:
     """The frequency of a link in each posture; of a base one for all, for it does not move."""
     if one.kind == "base" or not one.frequencies:
         return _known(one.frequency)
@@ -95,7 +96,7 @@ def _known(value: Known | None) -> str:
     return "–" if value is None else with_std(value.value, value.std)
 
 
-def _key_figures(sure: Sequence[Classified]) -> Table | None:
+def _key_figures(sure: Sequence[Finding]) -> Table | None:
     names = {"base": "base", "delay": "delay of joint {}"}
     rows = tuple(
         (
@@ -119,7 +120,7 @@ def _numbers(parameters: Mapping[str, Known]) -> str:
     )
 
 
-def _grouping(sure: Sequence[Classified], unsure: Sequence[Undecided]) -> Section:
+def _grouping(sure: Sequence[Finding], unsure: Sequence[Open]) -> Section:
     names = {"base": "the base", "joint": "joint {}"}
     tables = []
     if sure:

@@ -52,7 +52,7 @@ def test_a_stage_consists_of_what_it_imports() -> None:
     """frf: its module, what that imports and the packages around; every effect, which are found by name; no drawing."""
     sources = read_sources()
     code = code_of("pipelines.frf", sources, "pipelines.report")
-    for module in ("pipelines", "pipelines.frf", "pipelines.stage", "pipelines.frequency.result", "pipelines.frequency.rational_search",
+    for module in ("pipelines", "pipelines.frf", "pipelines.stage", "pipelines.frequency.result", "pipelines.frequency.rational",
                    "pipelines.effects.cogging", "pipelines.io.results"):
         assert module in code, module
     assert not [name for name in code if name.startswith("pipelines.report")]

@@ -5,12 +5,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import linalg, signal
 
+from pipelines.frequency.spectra import Responses, cross_spectra
+
 T = 1e-3  # [s]
+
+
+def welch_responses(stretches: Sequence[np.ndarray], rate: float, segment: int, source: int = 0,
+                    outputs: Sequence[int] = (1, 2)) -> Responses:
+    """From channel `source` to `outputs`, by averaged segments."""
+    return cross_spectra(stretches, rate, segment).responses(source, outputs)
 
 
 @dataclass(frozen=True)

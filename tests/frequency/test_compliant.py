@@ -14,7 +14,7 @@ from pipelines.frequency.rational import Known, Mode, Rational
 from pipelines.frequency.springs import explain, predicted
 from pipelines.io.log import Array
 
-_NONE = Rational(np.zeros(2), np.zeros((2, 2)), 0, 0, 0, 0.0, 1.0, (4.0, 250.0), 1.0, 0.0)
+_NONE = Rational(np.zeros(2), np.zeros((2, 2)), 0, 0, 1.0, (4.0, 250.0), 1.0, 0.0)
 
 
 def two_masses(motor: float, link: float, stiffness: float) -> tuple[float, float]:
@@ -91,7 +91,7 @@ def test_numbers_come_back() -> None:
     """Stiffness and motor inertia of a joint, frequency and inertia of a base, and all four of both together."""
     inertia = (1.1, 1.3)
     pairs = [[Pair(*one.modes[:2])] for one in (modes_of([two_masses(0.2, j - 0.2, 15000.0)], j) for j in inertia)]
-    spring = explain(pairs, inertia, base=False, joint=True)
+    spring = explain(pairs, inertia, (False, True))
     assert spring is not None
     assert spring.joint == pytest.approx((15000.0, 0.2), rel=1e-4)
     both = [list(zip(*three_masses(28.0, 8.0, 0.2, j - 0.2, 15000.0), strict=True)) for j in inertia]

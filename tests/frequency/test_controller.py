@@ -7,8 +7,12 @@ import pytest
 from scipy.signal import freqz
 
 from bench.control import Observer, observer_gain
-from pipelines.frequency.controller import continuous_controller, loop_delay, sampled_controller
-from pipelines.frequency.responses import double_integrator
+from pipelines.frequency.controller import (
+    continuous_controller,
+    double_integrator,
+    loop_delay,
+    sampled_controller,
+)
 from pipelines.io.log import Controller
 
 T = 1e-3

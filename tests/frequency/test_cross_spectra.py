@@ -7,7 +7,8 @@ import pytest
 from scipy import signal
 
 from pipelines.errors import InputRejected
-from pipelines.frequency.spectra import cross_spectra, welch_responses
+from pipelines.frequency.spectra import cross_spectra
+from tests.frequency.loops import welch_responses
 
 RATE = 1000.0
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.frequency.frequency_response import (
+from pipelines.frequency.spectra import (
     FrequencyResponse,
     bands_below,
     closed_loop,
     indirect,
 )
-from pipelines.frequency.spectra import welch_responses
-from tests.frequency.loops import Plant, T, closed_loop_record, controller
+from tests.frequency.loops import Plant, T, closed_loop_record, controller, welch_responses
 
 KP, KD = 400.0, 28.0
 PLANT = Plant(((28.0, 0.07, 0.15), (85.0, 0.05, 0.8)))
@@ -86,5 +85,5 @@ def test_variances_are_those_of_many_repetitions(way: str) -> None:
 def test_bands_of_low_coherence() -> None:
     """Stretches under the limit, with their ends; what is not known counts as low."""
     frequency = np.arange(1.0, 8.0)
-    assert bands_below(frequency, np.array([0.1, 0.2, 0.9, 0.69, 0.7, np.nan, 0.6])) == ((1.0, 2.0), (4.0, 4.0), (6.0, 7.0))
-    assert bands_below(frequency, np.ones(7)) == ()
+    assert bands_below(frequency, np.array([0.1, 0.2, 0.9, 0.69, 0.7, np.nan, 0.6]), 0.7) == ((1.0, 2.0), (4.0, 4.0), (6.0, 7.0))
+    assert bands_below(frequency, np.ones(7), 0.7) == ()

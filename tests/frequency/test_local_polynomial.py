@@ -7,10 +7,9 @@ import pytest
 from scipy import signal
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.frequency.frequency_response import closed_loop
 from pipelines.frequency.local_polynomial import local_polynomial
-from pipelines.frequency.spectra import welch_responses
-from tests.frequency.loops import Plant, T, closed_loop_record
+from pipelines.frequency.spectra import closed_loop
+from tests.frequency.loops import Plant, T, closed_loop_record, welch_responses
 
 RATE = 1.0 / T
 LIGHT = Plant(((28.0, 0.01, 0.3),))
@@ -115,7 +114,7 @@ def test_where_nothing_was_excited_nothing_is_known() -> None:
     u -= u.mean()
     x = np.stack([u, 2.0 * u, 3.0 * u], axis=1)
     x[:, 1:] += 1e-3 * rng.standard_normal((len(u), 2))
-    found = local_polynomial((x,), RATE, np.array([50.0, 200.0, 350.0]), width=3.0)
+    found = local_polynomial((x,), RATE, np.array([50.0, 200.0, 350.0]))
     quotient = closed_loop(found)
     assert np.isfinite(found.response[0]).all()
     assert np.isnan(found.response[1:]).all()
@@ -129,10 +128,10 @@ def test_what_cannot_be_found_is_said() -> None:
     """Too short for the window, missing samples, no excitation at all, frequencies beyond half the rate."""
     x = np.random.default_rng(0).standard_normal((5000, 3))
     at = np.array([50.0, 60.0])
-    for signals, width, code in ((x[:30], None, "T08"), (x, 0.5, "T08"), (np.where(x > 3.0, np.nan, x), None, "D01"),
-                                 (x * np.array([0.0, 1.0, 1.0]), None, "D09")):
+    for signals, code in ((x[:30], "T08"), (np.where(x > 3.0, np.nan, x), "D01"),
+                                 (x * np.array([0.0, 1.0, 1.0]), "D09")):
         with pytest.raises(InputRejected) as refused:
-            local_polynomial((signals,), RATE, at, width=width)
+            local_polynomial((signals,), RATE, at)
         assert refused.value.code == f"RRID-{code}"
     with pytest.raises(UsageError):
         local_polynomial((x,), RATE, np.array([50.0, 600.0]))

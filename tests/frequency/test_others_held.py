@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipelines.frequency.frequency_response import Responses
 from pipelines.frequency.others_held import others_held
+from pipelines.frequency.spectra import Responses
 
 _J, _COUPLING = 2.0, 0.5  # [kg m^2]
 
@@ -19,13 +19,13 @@ def test_a_joint_that_its_brake_holds_changes_nothing() -> None:
     values = np.stack([torque, 1.0 / (_J * s**2), moving, np.zeros_like(s)], axis=1)
     covariance = np.einsum("bk,kl->bkl", (1e-4 * np.abs(values)) ** 2, np.eye(4)).astype(complex)
     responses = Responses(f, values, covariance, np.ones(values.shape), "welch", 1.0, 10.0, 1.0)
-    alone = others_held(responses, rigid, 0, 1, (2,))
+    alone = others_held(responses, rigid, 0, 1, (2,), np.array([np.inf]))
     braked = others_held(responses, rigid, 0, 1, (2, 3), np.array([np.inf, 1.0]))
     assert alone is not None
     assert braked is not None
     np.testing.assert_array_equal(braked.response.response, alone.response.response)
     np.testing.assert_allclose(braked.response.response, 1.0 / (_J * s**2), rtol=1e-2)
-    assert others_held(responses, rigid, 0, 1, (3,)) is None
+    assert others_held(responses, rigid, 0, 1, (3,), np.array([np.inf])) is None
 
 
 def test_a_link_on_a_spring_stays_one_mode_where_its_neighbour_swings_freely() -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pipelines.frequency.findings import frf_findings
-from pipelines.frequency.frequency_response import FrequencyResponse
 from pipelines.frequency.modes import fitted_modes
 from pipelines.frequency.responses import How, Measured, measured_responses
+from pipelines.frequency.spectra import FrequencyResponse
 from pipelines.io.log import Array, Signal
 from tests.frf.loops import Loop, T, elastic, rigid
 from tests.seeds import rarely
