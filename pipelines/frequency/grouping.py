@@ -122,8 +122,8 @@ def group_joint(
         config: what decides.
 
     A gap answers as a spring does as long as it stays closed, and on average where it is crossed
-    (its describing function: Gelb, Vander Velde 1968, ch. 2): no open question leaves it out, and no
-    spring under a steady load that is damped as teeth are.
+    (its describing function: Gelb, Vander Velde 1968, ch. 2): no open question leaves it out, and
+    no spring under a steady load that is damped as teeth are.
     """
     config = config or GroupingConfig()
     unit = "kg m²" if revolute else "kg"
@@ -475,8 +475,8 @@ def seen_elsewhere(
     """Where the base is known, what other joints show at its frequency is the base as well.
 
     A base turns under the first joint before any other. What shows at one further joint alone,
-    while another bends on a spring, may be that spring, where it is faint or stands still where that
-    spring would make it: its link swings against a motor that its own controller, or friction,
+    while another bends on a spring, may be that spring, where it is faint or stands still where
+    that spring would make it: its link swings against a motor that its own controller, or friction,
     holds, and takes the motion away (a tuned absorber: Den Hartog 1934, chapter III).
     """
     config = config or GroupingConfig()

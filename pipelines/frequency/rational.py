@@ -276,7 +276,7 @@ def _cost(rest: Complex, freedom: float) -> tuple[float, Array]:
 
 
 def _refine(data: _Data, start: Rational) -> Rational:
-    """Find the most likely parameters nearby: by least squares, then with the variance's freedom."""
+    """Find the most likely parameters: by least squares, then with the variance's freedom."""
     p = _descend(data, start, np.inf, *_CONFIG.fine)
     if np.isfinite(data.freedom):
         p = _descend(data, replace(start, parameters=p), data.freedom, *_CONFIG.fine)

@@ -8,8 +8,9 @@
                                             whatever its coherence says
 
 Kostić et al. 2004, Section IV.D, eq. (26)-(29). u is r under computed torque, τ under PD.
-Compliance and accelerance are those of Φ_vq / Φ_vτ. Logs of one joint and one posture are realisations: what
-differs between them, or between the two directions, beyond the noise, is distortion.
+Compliance and accelerance are those of Φ_vq / Φ_vτ. Logs of one joint and one posture are
+realisations: what differs between them, or between the two directions, beyond the noise, is
+distortion.
 """
 
 from __future__ import annotations
