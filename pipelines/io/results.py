@@ -40,6 +40,10 @@ FLAT: Mapping[str, object] = {"flat": True}
 SCHEMA_VERSION = 2  # numerics: of result.json
 _SERIES = "$series"
 _AGAIN = "run the command again"
+# of a dataclass: comments above a field, its name, and its line with those that go on with it
+_FIELD = re.compile(
+    r"((?:^    # .*\n)*)^    (\w+) ?: (.*\n(?:^(?:     |    \)).*\n)*)", re.MULTILINE
+)
 
 
 def _stored_fields(kind: Any) -> list[Any]:
@@ -269,17 +273,17 @@ class _Models:
             """Numbers; null: infinite or undefined."""
 
         Numbers.model_rebuild(_types_namespace={"Numbers": Numbers})
-        self.strict, self.array = Strict, Numbers | Series
-        self.found: dict[type[Any], Any] = {}
+        self.strict = Strict
+        self.found: dict[Any, Any] = {np.ndarray: Numbers | Series, float: float | None, Path: str}
 
     def of(self, kind: type[Any], head: Mapping[str, Any]) -> Any:
         """Return the model of a dataclass with the fields `head` before its own."""
         from pydantic import create_model
 
-        fields = dict(head) | self._fields(kind)
         doc = " ".join((kind.__doc__ or "").strip().split("\n\n")[0].split())
         made = doc.startswith(f"{kind.__name__}(")  # by dataclass
         options: dict[str, Any] = {"__base__": self.strict, "__doc__": None if made else doc}
+        fields = {**head, **self._fields(kind)}
         return create_model(kind.__name__, __module__=kind.__module__, **options, **fields)
 
     def _fields(self, kind: type[Any]) -> dict[str, Any]:
@@ -293,27 +297,22 @@ class _Models:
                 about = Field(description=words[field.name])
                 fields[field.name] = (self._translated(hint), about)
                 continue
-            parts = typing.get_args(hint) or (hint,)
-            inner = next(one for one in parts if dataclasses.is_dataclass(one))
+            inner = next(x for x in (*typing.get_args(hint), hint) if dataclasses.is_dataclass(x))
             for name, (own, about) in self._fields(typing.cast(type[Any], inner)).items():
-                optional = Field(default=None, description=about.description)
-                fields.setdefault(name, (own, optional))
+                fields.setdefault(name, (own, Field(default=None, description=about.description)))
         return fields
 
     def _translated(self, hint: Any) -> Any:
         """Return a type as JSON has it: arrays as numbers, dataclasses as models."""
         origin, arguments = typing.get_origin(hint), typing.get_args(hint)
-        if origin is np.ndarray or hint is np.ndarray:
-            return self.array
-        if dataclasses.is_dataclass(hint) and isinstance(hint, type):
-            if hint not in self.found:
-                self.found[hint] = self.of(hint, {})
-            return self.found[hint]
-        if origin is typing.Literal or origin is None:
-            return {float: float | None, Path: str}.get(hint, hint)
-        if origin in (typing.Union, types.UnionType):
-            return typing.Union[tuple(map(self._translated, arguments))]  # noqa: UP007
+        key = np.ndarray if origin is np.ndarray else hint
+        if dataclasses.is_dataclass(hint) and isinstance(hint, type) and hint not in self.found:
+            self.found[hint] = self.of(hint, {})
+        if origin in (None, typing.Literal, np.ndarray):
+            return self.found.get(key, hint)
         inner = tuple(one if one is Ellipsis else self._translated(one) for one in arguments)
+        if origin in (typing.Union, types.UnionType):
+            return typing.Union[inner]  # noqa: UP007
         if isinstance(origin, type) and issubclass(origin, Mapping):
             return dict.__class_getitem__(inner)
         return origin[inner]
@@ -323,27 +322,11 @@ def words_of(kind: type[Any]) -> dict[str, str]:
     """Map every field of a dataclass to the comment beside or above it, else to its name."""
     found: dict[str, str] = {}
     for base in reversed(kind.__mro__):
-        if not dataclasses.is_dataclass(base):
-            continue
         try:
-            lines = inspect.getsource(base).splitlines()
+            source = inspect.getsource(base) if dataclasses.is_dataclass(base) else ""
         except (OSError, TypeError):
-            lines = []
-        above: list[str] = []
-        name = ""
-        for line in lines:
-            code, _, comment = line.partition("# ")
-            if line.strip().startswith("# "):
-                above.append(comment)
-                continue
-            if match := re.match(r"    (\w+) ?: ", line):
-                name = match[1]
-                found[name] = " ".join(above)
-            elif not line.startswith("     ") and line.strip() != ")":
-                name = ""
-            if name and code and comment:
-                found[name] = " ".join([found[name], comment]).strip()
-            above = []
-    fields = {field.name for field in dataclasses.fields(kind)}
-    spoken = {name: name.replace("_", " ") for name in fields}
-    return {name: ": ".join(filter(None, (spoken[name], found.get(name)))) for name in fields}
+            source = ""
+        for above, name, code in _FIELD.findall(source):
+            found[name] = " ".join(re.findall(r"# (.*)", above + code))
+    names = {field.name: field.name.replace("_", " ") for field in dataclasses.fields(kind)}
+    return {n: f"{words}: {found[n]}" if found.get(n) else words for n, words in names.items()}
