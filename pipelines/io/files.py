@@ -11,7 +11,7 @@ import contextlib
 import glob
 import os
 import shlex
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -48,6 +48,7 @@ from pipelines.io.output import (
 )
 from pipelines.io.robot import RobotDescription
 from pipelines.io.sandbox import Answer, guarded, regular_file
+from pipelines.io.schema import Array
 from pipelines.io.units import to_si
 
 # `import` reads JSON too, but so are results
@@ -269,30 +270,30 @@ def _conform(log: ExperimentLog, assume_units: bool, checks: list[Check]) -> Exp
     signals = {}
     for name, signal in log.signals.items():
         where = f"{log.source or log.name}, signal {name}"
-        turned = _oriented(log, name, signal, where, checks)
-        signals[name] = _in_si(name, turned, law, where, assume_units, checks)
+        turned, remedy = _turned(log, name, signal.values)
+        if remedy:
+            words = f"stored as {signal.values.shape}, read as {turned.shape}"
+            checks.append(Check.of("S11", "warn", words, where, remedy))
+        if turned is not signal.values:
+            signal = replace(signal, values=turned)
+        signals[name] = _in_si(name, signal, law, where, assume_units, checks)
     if any(signals[name] is not log.signals[name] for name in signals):
         log = replace(log, signals=signals)
     refuse_unlike_format(log)
     return log
 
 
-def _oriented(
-    log: ExperimentLog, name: str, signal: Signal, where: str, checks: list[Check]
-) -> Signal:
-    """Return a signal that is stored as (joints, samples), or t as a column, turned (S11)."""
-    values, n, samples = signal.values, log.n_joints, log.t.size
-    if name == "t" and values.ndim > 1 and 1 in values.shape:
-        turned, remedy = values.reshape(-1), "store t as a vector"
-    elif name != "t" and n == 1 and values.shape == (samples,):
-        return replace(signal, values=values[:, None])
-    elif name != "t" and values.shape == (n, samples) and n != samples:
-        turned, remedy = np.ascontiguousarray(values.T), "store (samples, joints)"
-    else:
-        return signal
-    words = f"stored as {values.shape}, read as {turned.shape}"
-    checks.append(Check.of("S11", "warn", words, where, remedy))
-    return replace(signal, values=turned)
+def _turned(log: ExperimentLog, name: str, values: Array) -> tuple[Array, str]:
+    """Return samples as (samples, joints), t as a vector; and what to store, where it differs."""
+    n, samples = log.n_joints, log.t.size
+    if name == "t":
+        column = values.ndim > 1 and 1 in values.shape
+        return (values.reshape(-1), "store t as a vector") if column else (values, "")
+    if n == 1 and values.shape == (samples,):
+        return values[:, None], ""
+    if values.shape == (n, samples) and n != samples:
+        return np.ascontiguousarray(values.T), "store (samples, joints)"
+    return values, ""
 
 
 def _in_si(
@@ -302,20 +303,20 @@ def _in_si(
     wanted = schema.unit_of(name, law)
     if signal.units == wanted:
         return signal
-    if not signal.units.strip():
-        if not assume_units:
-            words = f"no units; {wanted} is what the format wants"
-            remedy = "declare them, or pass --assume-units if they are SI"
-            raise InputRejected("S04", words, where, remedy)
-        words = f"no units; taken as {wanted}, as --assume-units says"
-        checks.append(Check.of("S04", "warn", words, where, "write the attribute units"))
-        return replace(signal, units=wanted)
-    unit = to_si(signal.units, schema.quantity_of(name, law), where=where)
-    if not unit.is_si:
+    if signal.units.strip():
+        unit = to_si(signal.units, schema.quantity_of(name, law), where=where)
+        if unit.is_si:
+            return replace(signal, units=wanted)
         words = f"declared in {signal.units}, converted to {wanted}"
         remedy = "store SI units, if results should not list the conversion"
         checks.append(Check.of("S06", "warn", words, where, remedy))
-    return replace(signal, values=unit.factor * signal.values + unit.offset, units=wanted)
+        return replace(signal, values=unit.factor * signal.values + unit.offset, units=wanted)
+    if not assume_units:
+        remedy = "declare them, or pass --assume-units if they are SI"
+        raise InputRejected("S04", f"no units; {wanted} is what the format wants", where, remedy)
+    words = f"no units; taken as {wanted}, as --assume-units says"
+    checks.append(Check.of("S04", "warn", words, where, "write the attribute units"))
+    return replace(signal, units=wanted)
 
 
 def expanded(inputs: Iterable[Path]) -> tuple[Path, ...]:
@@ -354,84 +355,74 @@ def find_logs(
         EnvironmentFault: F13, a folder cannot be listed.
         NothingMatched: there is no log at all.
     """
-    found: list[Path] = []
-    checks: list[Check] = []
+    search = _Search(unreadable)
     inputs = tuple(inputs)
-    folders = [path for path in inputs if os.path.isdir(path)]
     for path in inputs:
-        if path not in folders:
+        if not os.path.isdir(path):
             regular_file(path)
-            found.append(path)
-            continue
-        own = (path / PROVENANCE).is_file()
-        found += _below(path / "logs" if own else path, checks, unreadable)
-        found += [plan for plan in (path / name for name in PLANS) if own and plan.is_file()]
-    if not found and not unreadable:
-        raise _nothing_there(", ".join(map(str, inputs)), checks, folders)
-    return tuple(dict.fromkeys(found)), tuple(checks)
+            search.logs.append(path)
+        elif (path / PROVENANCE).is_file():
+            search.below(path / "logs")
+            search.logs += [plan for plan in (path / name for name in PLANS) if plan.is_file()]
+        else:
+            search.below(path)
+    if not search.logs and not unreadable:
+        raise search.nothing_there(", ".join(map(str, inputs)))
+    return tuple(dict.fromkeys(search.logs)), tuple(search.checks)
 
 
-def _nothing_there(
-    where: object, checks: Sequence[Check], folders: Sequence[Path]
-) -> NothingMatched:
-    """Return the error that there is no log (C06), with what to give instead."""
-    passed, remedy = "", "logs end in .h5 or .parquet"
-    links = [str(check.where) for check in checks if check.code == "RRID-X11"]
-    own = [path.parent for path in _within(folders, PROVENANCE) if path.parent not in folders]
-    results = [str(folder) for folder in own if (folder / "logs").is_dir()]
-    recorded = [path for path in _within(folders, "*") if path.suffix.lower() in RECORDINGS]
-    over = list(dict.fromkeys([*links, *results]))
-    if over:
-        passed = f"; links and results of rrrid are passed over, here {len(over)}"
-        there = [path for path in over if os.path.isdir(path)]
-        if there:
-            more = " …" if there[3:] else ""
-            remedy = f"give what is meant by its own path: {shlex.join(there[:3])}{more}"
-    elif recorded:
-        passed = f", but recordings such as {recorded[0].name}"
-        draft = f"rrrid import --guess {shlex.quote(str(recorded[0]))}"
-        remedy = f"make logs of them; this drafts the recipe: {draft}"
-    return NothingMatched("C06", f"no log there{passed}", where, remedy)
+class _Search:
+    """The logs below some folders, and what was passed over."""
 
+    def __init__(self, unreadable: list[Path] | None) -> None:
+        self.unreadable = unreadable
+        self.logs: list[Path] = []
+        self.checks: list[Check] = []
+        self.passed: list[Path] = []  # links, and results of rrrid
+        self.recordings: list[Path] = []
 
-def _within(folders: Sequence[Path], pattern: str) -> list[Path]:
-    """Return the files that match `pattern` in `folders` and two levels below, none hidden."""
-    found = []
-    with contextlib.suppress(OSError):
-        for folder in folders:
-            for above in ("", "*/", "*/*/"):
-                for path in sorted(folder.glob(f"{above}{pattern}")):
-                    parts = path.relative_to(folder).parts
-                    if path.is_file() and not any(part.startswith(".") for part in parts):
-                        found.append(path)
-    return found
+    def below(self, folder: Path) -> None:
+        """Search a folder and those in it, in order."""
+        try:
+            for entry in sorted(folder.iterdir()):
+                if not entry.name.startswith("."):
+                    self._look_at(entry)
+        except FileNotFoundError:
+            pass  # removed meanwhile
+        except OSError as problem:
+            if self.unreadable is None:
+                raise fault_of(problem, folder) from None
+            self.unreadable.append(folder)
 
+    def _look_at(self, entry: Path) -> None:
+        is_log = entry.suffix.lower() in ENDINGS
+        if entry.is_symlink() and (entry.is_dir() or (is_log and not entry.exists())):
+            words, remedy = "link that leads nowhere, or in a circle,", "remove it"
+            if entry.is_dir():
+                words, remedy = "link to a folder", "give what it leads to by its own path"
+            words = f"{words} passed over"
+            self.checks.append(Check.of("X11", "warn", words, entry, f"{remedy}, if it is meant"))
+            self.passed.append(entry)
+        elif entry.is_dir() and (entry / PROVENANCE).is_file():
+            self.passed += [entry] if (entry / "logs").is_dir() else []
+        elif entry.is_dir():
+            self.below(entry)
+        elif is_log and entry.exists():
+            self.logs.append(entry)
+        elif entry.suffix.lower() in RECORDINGS:
+            self.recordings.append(entry)
 
-def _below(folder: Path, checks: list[Check], unreadable: list[Path] | None) -> list[Path]:
-    """Return the logs below `folder`, in order; X11 for links that are passed over."""
-    found: list[Path] = []
-    try:
-        for entry in sorted(folder.iterdir()):
-            is_folder, is_log = entry.is_dir(), entry.suffix.lower() in ENDINGS
-            if entry.name.startswith("."):
-                continue
-            if entry.is_symlink() and is_folder:
-                words = "link to a folder passed over"
-                remedy = "give what it leads to by its own path, if that is meant"
-                checks.append(Check.of("X11", "warn", words, entry, remedy))
-            elif entry.is_symlink() and is_log and not entry.exists():
-                words = "link that leads nowhere, or in a circle, passed over"
-                remedy = "remove it, or let it lead to a log"
-                checks.append(Check.of("X11", "warn", words, entry, remedy))
-            elif is_folder:
-                own = (entry / PROVENANCE).is_file()
-                found += [] if own else _below(entry, checks, unreadable)
-            elif is_log and entry.exists():
-                found.append(entry)
-    except FileNotFoundError:
-        pass  # removed meanwhile
-    except OSError as problem:
-        if unreadable is None:
-            raise fault_of(problem, folder) from None
-        unreadable.append(folder)
-    return found
+    def nothing_there(self, where: str) -> NothingMatched:
+        """Return the error that there is no log (C06), with what to give instead."""
+        passed, remedy = "", "logs end in .h5 or .parquet"
+        if self.passed:
+            passed = f"; links and results of rrrid are passed over, here {len(self.passed)}"
+            if there := [str(path) for path in self.passed if path.is_dir()]:
+                more = " …" if there[3:] else ""
+                remedy = f"give what is meant by its own path: {shlex.join(there[:3])}{more}"
+        elif self.recordings:
+            first = self.recordings[0]
+            passed = f", but recordings such as {first.name}"
+            draft = f"rrrid import --guess {shlex.quote(str(first))}"
+            remedy = f"make logs of them; this drafts the recipe: {draft}"
+        return NothingMatched("C06", f"no log there{passed}", where, remedy)

@@ -17,7 +17,7 @@ from pipelines.io.config import FORMAT as LIMITS
 from pipelines.io.sandbox import Answer
 from pipelines.io.schema import FORMAT, FORMAT_VERSION, Array, plain
 
-_GROUPS = ("controller", "derived")
+_HEAD, _GROUPS = ("format", "format_version"), ("controller", "derived")
 _AGAIN = "copy the file again from where it was recorded"
 _OPTIONS: dict[str, Any] = {
     "dtype": "<f8",
@@ -144,34 +144,30 @@ def read_parts(path: Path, only: Collection[str] | None = None) -> Answer:
     with _opened(path) as file:
         # First what could lead elsewhere, then what the file says it is, then its names.
         _refuse_links(file, where)
-        head = [name for name in ("format", "format_version") if name in file.attrs]
-        refuse_version({name: _attribute(file.attrs, name, where) for name in head}, "HDF5", where)
+        head = {n: _attribute(file.attrs, n, where) for n in _HEAD if n in file.attrs}
+        refuse_version(head, "HDF5", where)
         _refuse_unknown(file, ("robot", "signals", *_GROUPS), where)
-        attributes = {k: v for k, v in _attributes(file, where).items() if k not in head}
+        attributes = _attributes(file, where)
         digest = attributes.pop("digest", None)
-        groups: dict[str, Any] = {"attributes": attributes}
+        groups: dict[str, Any] = {
+            "attributes": {n: attributes[n] for n in attributes if n not in _HEAD}
+        }
         for name in _GROUPS:
             if name in file:
-                place = f"{where}, /{name}"
-                group = _group(file, name, where)
-                _refuse_links(group, place)
-                _refuse_unknown(group, (), place)
-                groups[name] = _attributes(group, place)
+                groups[name] = _attributes(_group(file, name, (), where), f"{where}, /{name}")
         if "robot" in file:
             groups["robot"] = _robot_text(file["robot"], where)
-        signals = _group(file, "signals", where)
-        _refuse_links(signals, f"{where}, /signals")
-        _refuse_many(signals, f"{where}, /signals")
+        signals = _group(file, "signals", file.get("signals", ()), where)
         for name in signals:
             _refuse_bad_dataset(signals[name], f"{where}, /signals/{name}")
         declared = sum(8 * math.prod(one.shape) for one in signals.values())
         refuse_oversize(declared, path.stat().st_size, "X05", where)
-        read = [name for name in signals if only is None or name in only]
         words, arrays = {}, {}
-        for name in read:
-            place = f"{where}, /signals/{name}"
-            words[name] = _attributes(signals[name], place)
-            arrays[name] = _reals(signals[name], place)
+        for name in signals:
+            if only is None or name in only:
+                place = f"{where}, /signals/{name}"
+                words[name] = _attributes(signals[name], place)
+                arrays[name] = _reals(signals[name], place)
         return Answer({"groups": groups, "digest": digest, "signals": words}, arrays)
 
 
@@ -205,33 +201,31 @@ def _refuse_links(group: Any, where: str) -> None:
             raise InputRejected("X04", words, where, remedy)
 
 
-def _refuse_many(group: Any, where: str) -> None:
-    """Refuse endless groups (X04)."""
-    if max(len(group), len(group.attrs)) > LIMITS.members:
-        words = f"more than {LIMITS.members} members or attributes"
-        raise InputRejected("X04", words, where, "a log holds robot, controller and signals")
-
-
 def _refuse_unknown(group: Any, known: Collection[str], where: str) -> None:
     """Refuse what the format does not name (S19); a group, however deep, unseen (X04)."""
     import h5py
 
-    _refuse_many(group, where)
+    if max(len(group), len(group.attrs)) > LIMITS.members:
+        words = f"more than {LIMITS.members} members or attributes"
+        raise InputRejected("X04", words, where, "a log holds robot, controller and signals")
     for name in group:
-        if name in known:
-            continue
-        words = f"'{name}' is not in format version {FORMAT_VERSION}"
-        if group.get(name, getclass=True) is h5py.Group:
-            raise InputRejected("X04", f"group {words}, and not looked into", where, "remove it")
-        raise InputRejected("S19", words, where, "remove it")
+        if name not in known:
+            words = f"'{name}' is not in format version {FORMAT_VERSION}"
+            if group.get(name, getclass=True) is h5py.Group:
+                words = f"group {words}, and not looked into"
+                raise InputRejected("X04", words, where, "remove it")
+            raise InputRejected("S19", words, where, "remove it")
 
 
-def _group(file: Any, name: str, where: str) -> Any:
+def _group(file: Any, name: str, known: Collection[str], where: str) -> Any:
+    """Return a group that holds nothing but `known`, and no links."""
     import h5py
 
     if file.get(name, getclass=True) is not h5py.Group:
         remedy = "a log has /robot and /signals"
         raise InputRejected("S01", f"group /{name} is missing", where, remedy)
+    _refuse_links(file[name], f"{where}, /{name}")
+    _refuse_unknown(file[name], known, f"{where}, /{name}")
     return file[name]
 
 
@@ -255,9 +249,7 @@ def _attribute(attributes: Any, name: str, where: str) -> Any:
     value = attributes[name]
     if isinstance(value, h5py.Empty):
         raise InputRejected("S20", "empty", where, "write its value, or leave it out")
-    if isinstance(value, np.generic | np.ndarray):
-        value = value.tolist()
-    return plain(_text(value))
+    return plain(_text(value.tolist() if isinstance(value, np.generic | np.ndarray) else value))
 
 
 def _text(value: Any) -> Any:

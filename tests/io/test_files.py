@@ -224,12 +224,12 @@ def test_where_nothing_is_but_links_and_results_they_are_named(tmp_path: Path) -
     assert find_logs([tmp_path / "two/c"])[0]
 
 
-def test_recordings_and_results_are_sought_two_levels_below(tmp_path: Path) -> None:
-    """Not farther, nor in hidden folders; a path with a blank is quoted."""
-    for place in ("x/y/z/r", ".hidden/r"):
-        (tmp_path / place / "logs").mkdir(parents=True)
-        (tmp_path / place / "provenance.json").write_text('{"tool": "rrrid"}')
-        (tmp_path / place / "run.csv").write_text("t,q")
+def test_recordings_and_results_are_sought_below(tmp_path: Path) -> None:
+    """But not in hidden folders; a path with a blank is quoted."""
+    (tmp_path / "x").mkdir()
+    (tmp_path / ".hidden/r/logs").mkdir(parents=True)
+    (tmp_path / ".hidden/r/provenance.json").write_text('{"tool": "rrrid"}')
+    (tmp_path / ".hidden/r/run.csv").write_text("t,q")
     with pytest.raises(NothingMatched, match=r"no log there\. Logs end"):
         find_logs([tmp_path])
     (tmp_path / "x/run 1.csv").write_text("t,q")
