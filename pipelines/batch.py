@@ -55,14 +55,12 @@ from pipelines.stage import Outcome
 # The commands that read a folder of logs and nothing else.
 STAGES = ("run", "convert", "simulate", *(module.replace("_", "-") for module in STEPS))
 _LIBRARIES = ("numpy", "scipy", "h5py", "pyarrow", "pandas", "matplotlib", "filterpy", "jinja2")
-_ELSEWHERE = "choose another folder with --out"
 _MARK = "batch.json"
 _APART = {"items", "ledger", "crashes"}  # what result.json and the page are made of
 _OURS = _APART | {"figures", _MARK, "report.html", "summary.parquet", "junit.xml", "result.json"}
-
-
 _TEXTS = ["item", "status", "code", "message", "verdict", "robot", "recorded", "quantity", "unit"]
-_COLUMNS = dict.fromkeys(_TEXTS, str) | {"exit": int, "value": float, "std": float, "away": float}
+_COLUMNS = {**dict.fromkeys(_TEXTS, "string"), "exit": "int64"}
+_COLUMNS |= dict.fromkeys(("value", "std", "away"), "Float64")
 
 
 def module_of(stage: str) -> str:
@@ -73,8 +71,7 @@ def module_of(stage: str) -> str:
     """
     if stage not in STAGES:
         words = f"'{stage}' is no stage of a batch{did_you_mean(stage, STAGES)}"
-        remedy = f"one of: {', '.join(STAGES)}"
-        raise UsageError("C01", words, where="--stage", remedy=remedy)
+        raise UsageError("C01", words, "--stage", f"one of: {', '.join(STAGES)}")
     return f"pipelines.{stage.replace('-', '_')}"
 
 
@@ -95,7 +92,7 @@ def find_items(root: Path, each_log: bool = False) -> tuple[tuple[Item, ...], tu
     if not os.path.isdir(root):
         regular_file(root)
         words = "is a log, not a folder of folders"
-        raise UsageError("C02", words, where=root, remedy="run the stage on it alone")
+        raise UsageError("C02", words, root, "run the stage on it alone")
     unreadable: list[Path] = []
     logs, checks = find_logs([root], unreadable)
     folders: dict[Path, list[Path]] = {folder: [] for folder in unreadable}
@@ -118,20 +115,15 @@ def run_batch(plan: Plan, tell: Callable[[str], None] = lambda words: None) -> O
         EnvironmentFault: P08, another batch writes there; P02, F13, the output cannot be written;
             P04, no worker.
     """
-    root, out, wanted = plan.root.absolute(), plan.out.absolute(), plan.out
-    items, checks = find_items(root, plan.each_log)
-    refuse_place(out, (), (root,))
-    plan = replace(plan, root=root, out=out)
-    claim(out, plan.stage, plan.request.force)
+    wanted, plan = plan.out, replace(plan, root=plan.root.absolute(), out=plan.out.absolute())
+    items, checks = find_items(plan.root, plan.each_log)
+    refuse_place(plan.out, (), (plan.root,))
+    claim(plan.out, plan.stage, plan.request.force)
     number, of = plan.shard
-    with locked(out / "ledger", out), _signals() as heard:
+    with locked(plan.out / "ledger", plan.out), _signals() as heard:
         batch = _Batch(plan, heard)
-        batch.begin()
         batch.go(items[number - 1 :: of], tell)
-        every = [one for item in items[number - 1 :: of] for one in batch.parts(item)]
-        records = [batch.records.get(item.slug) or batch.missing(item) for item in every]
-        result = result_of(plan.stage, records, renamed(checks, {str(root): ""}))
-        outcome = batch.finish(result, records, every)
+        outcome = batch.finish(items[number - 1 :: of], renamed(checks, {str(plan.root): ""}))
     if batch.fault is not None:
         raise batch.fault
     return replace(outcome, folder=wanted)
@@ -139,26 +131,25 @@ def run_batch(plan: Plan, tell: Callable[[str], None] = lambda words: None) -> O
 
 def claim(out: Path, stage: str, force: bool = False) -> None:
     """Refuse an output that is not new, empty, or that of a batch of the same stage (C05)."""
+
+    def refused(words: str, instead: str = "") -> UsageError:
+        return UsageError("C05", words, out, f"choose another folder with --out{instead}")
+
     if out.is_symlink() or (out.exists() and not out.is_dir()):
-        raise UsageError("C05", "is not a folder", where=out, remedy=_ELSEWHERE)
+        raise refused("is not a folder")
     with environment_faults(out):
         out.mkdir(parents=True, exist_ok=True)
         there = {path.name for path in out.iterdir() if not path.name.startswith(".rrrid-tmp-")}
-    if not there - {"ledger"}:
-        return
     earlier = _stage_of(out)
-    if not earlier:
-        words = "holds files that no batch wrote there"
-        if command := written_by(out):
-            words = f"holds the result of '{command}'"
-        raise UsageError("C05", words, where=out, remedy=_ELSEWHERE)
+    if there - {"ledger"} and not earlier:
+        command = written_by(out)
+        raise refused(f"holds the result of '{command}'" if command else "holds files of no batch")
     if foreign := sorted(there - _OURS - {PROVENANCE}):
         words = f"holds files that rrrid did not write there: {', '.join(foreign[:3])}"
-        raise UsageError("C05", words, where=out, remedy=f"{_ELSEWHERE}, or move them")
-    if earlier != stage and not force:
+        raise refused(words, ", or move them")
+    if earlier not in ("", stage) and not force:
         words = f"holds a batch of {clean(earlier, 40)}"
-        remedy = f"{_ELSEWHERE}, or replace it with --force"
-        raise UsageError("C05", words, where=out, remedy=remedy)
+        raise refused(words, ", or replace it with --force")
 
 
 def _stage_of(out: Path) -> str:
@@ -187,42 +178,33 @@ class _Batch:
     """The records so far, each in the ledger as soon as it is there."""
 
     def __init__(self, plan: Plan, heard: list[int]) -> None:
+        """Mark the folder, and read what was done in it."""
         self.plan, self.heard, self.out = plan, heard, plan.out
-        self.started = time.time()
-        self.key = _key(plan)
+        self.started, self.key = time.time(), _key(plan)
         self.records: dict[str, Record] = {}
-        self.divided: dict[str, tuple[Item, ...]] = {}  # sessions of the items that hold several
+        self.divided: dict[str, list[Item]] = {}  # sessions of the items that hold several
         self.kept = 0
         self.notices: list[Check] = []
         self.fault: EnvironmentFault | None = None  # no output can be written, or no worker is left
         self.aborted = False
         self.ledger = self.out / "ledger" / "{}-of-{}.jsonl".format(*plan.shard)
-
-    def begin(self) -> None:
-        """Mark the folder, and read what was done in it."""
-        about = {"tool": "rrrid", "command": "batch", "version": __version__}
-        text = json_text(about | {"stage": self.plan.stage})
-        if _stage_of(self.out) != self.plan.stage:  # replaced, as --force says
+        if _stage_of(self.out) != plan.stage:  # replaced, as --force says
             for folder in ("items", "crashes"):
                 shutil.rmtree(self.out / folder, ignore_errors=True)
         self.earlier = read_ledger(self.out)
-        write_text(self.out / _MARK, text)
+        about = {"tool": "rrrid", "command": "batch", "version": __version__, "stage": plan.stage}
+        write_text(self.out / _MARK, json_text(about))
         with environment_faults(self.out):
             (self.out / PROVENANCE).unlink(missing_ok=True)
             (self.out / "items").mkdir(exist_ok=True)
             sweep(self.out / "items")
-            lines = "".join(record_line(record) for record in self.earlier.values())
-            write_text(self.ledger, lines)
+            write_text(self.ledger, "".join(map(record_line, self.earlier.values())))
             for path in self.ledger.parent.glob("*.jsonl"):
-                if path != self.ledger and self.plan.shard == (1, 1):
+                if path != self.ledger and plan.shard == (1, 1):
                     path.unlink()
 
     def stopped(self) -> bool:
         return bool(self.heard) or self.fault is not None or self.aborted
-
-    def parts(self, item: Item) -> tuple[Item, ...]:
-        """Return the sessions of an item, or the item itself."""
-        return self.divided.get(item.slug, (item,))
 
     def go(self, items: Iterable[Item], tell: Callable[[str], None]) -> None:
         """Do what is not done yet, until all is done or something stops it."""
@@ -233,9 +215,11 @@ class _Batch:
         try:
             with contextlib.closing(run_items(self.plan, waiting, self.stopped)) as results:
                 for item, record in results:
-                    self._take(item, record)
-                    if item.slug in self.divided:
-                        sessions = self.divided[item.slug]
+                    try:
+                        self._take(item, record)
+                    except EnvironmentFault as problem:  # no room: what is done is done
+                        self.fault = problem
+                    if sessions := self.divided.get(item.slug):
                         waiting += [one for one in sessions if not self._keep(one)]
                         total += len(sessions) - 1
                     elif item.slug in self.records:
@@ -243,7 +227,7 @@ class _Batch:
                         tell(f"{len(self.records)} of {total}: {done.name} {done.status}")
                     if self.stopped():
                         break
-        except EnvironmentFault as problem:  # no workers, or none any more: what is done is done
+        except EnvironmentFault as problem:  # no workers, or none any more
             self.fault = problem
 
     def _keep(self, item: Item) -> bool:
@@ -251,55 +235,46 @@ class _Batch:
         record = self.earlier.get(item.slug)
         if not self.plan.resume or self.heard or record is None or record.key != self.key:
             return False
-        if not record.provenance:
-            return False
         logs = sorted(relative(log, self.plan) for log in item.logs)
-        inputs = {name: _hash(self.plan.root / name) for name in record.inputs}
-        if sorted(record.logs) != logs or inputs != record.inputs:
+        same = all(_hash(self.plan.root / name) == sha for name, sha in record.inputs.items())
+        if not record.provenance or sorted(record.logs) != logs or not same:
             return False
         if not is_intact(record, self.out / "items" / item.slug):
             words = "its stored result is not what was written; done again"
             remedy = "check the disk, if you have not changed it"
-            check = Check.of("P10", "warn", words, where=item.name, remedy=remedy)
-            self.notices.append(check)
+            self.notices.append(Check.of("P10", "warn", words, item.name, remedy))
             return False
         self.records[item.slug] = record
         self.kept += 1
         return True
 
     def _take(self, item: Item, record: Record) -> None:
-        """Remember the outcome of an item; one without a result leaves no older one behind."""
+        """Remember the outcome of an item; one without a result leaves no older one behind.
+
+        Raises:
+            EnvironmentFault: no output can be written, by this process or the item's.
+        """
         error = record.item.error
         is_ours = error is not None and error.where.startswith(tilde(f"{self.out}/"))
         if error is not None and is_ours and record.item.exit == EnvironmentFault.exit_code:
             code, remedy = error.code.removeprefix("RRID-"), "free it, and go on with --resume"
-            self.fault = EnvironmentFault(code, error.message, where=error.where, remedy=remedy)
-            return
-        try:
-            if not record.provenance:
-                self._discard(item.slug)
-            crash = self.out / "crashes" / f"{item.slug}.txt"
-            crash.unlink(missing_ok=True)
-            if record.trace:
-                write_text(crash, record.trace)
-            record = replace(record, trace="", key=self.key)
-            with environment_faults(self.ledger), self.ledger.open("a", encoding="ascii") as file:
-                file.write(record_line(record))
-        except EnvironmentFault as problem:
-            self.fault = problem
-            return
+            raise EnvironmentFault(code, error.message, error.where, remedy)
+        if not record.provenance:
+            self._discard(item.slug)
+        crash = self.out / "crashes" / f"{item.slug}.txt"
+        crash.unlink(missing_ok=True)
+        if record.trace:
+            write_text(crash, record.trace)
+        record = replace(record, trace="", key=self.key)
+        with environment_faults(self.ledger), self.ledger.open("a", encoding="ascii") as file:
+            file.write(record_line(record))
         if record.sessions:
-            names = [(session, f"{item.name}: {session}") for session in record.sessions]
-            self.divided[item.slug] = tuple(replace(item, name=n, session=s) for s, n in names)
+            self.divided[item.slug] = [
+                replace(item, name=f"{item.name}: {name}", session=name) for name in record.sessions
+            ]
             return
         self.records[item.slug] = record
         self.aborted = self.plan.abort and record.item.status in ("rejected", "failed")
-
-    def missing(self, item: Item) -> Record:
-        """Return the record of an item that was not reached."""
-        how = "interrupted" if self.heard else "stopped"
-        words, remedy = f"not done: the batch was {how}", "go on with --resume"
-        return failed(self.plan, item, EnvironmentFault("P06", words, remedy=remedy))
 
     def _discard(self, slug: str) -> None:
         """Remove an item's result, in one step."""
@@ -310,17 +285,21 @@ class _Batch:
                 os.replace(folder, aside)
                 shutil.rmtree(aside)
 
-    def finish(self, result: Result, records: list[Record], every: list[Item]) -> Outcome[Result]:
+    def finish(self, items: Iterable[Item], checks: tuple[Check, ...]) -> Outcome[Result]:
         """Write the summary; where the disk is full still, the first fault is reported."""
         out, plan = self.out, self.plan
+        every = [one for item in items for one in self.divided.get(item.slug, [item])]
+        how = "interrupted" if self.heard else "stopped"
+        words, remedy = f"not done: the batch was {how}", "go on with --resume"
+        missing = EnvironmentFault("P06", words, remedy=remedy)
+        records = [self.records.get(one.slug) or failed(plan, one, missing) for one in every]
+        result = result_of(plan.stage, records, checks)
         done = not self.stopped()
         report = tilde(batch_report(result, figures=done and not plan.request.no_report))
         object_ = tilde(headed("batch", encode(result)[0]))
         try:
             with environment_faults(out):
-                self._sweep(
-                    {item.slug for item in every} if done and plan.shard == (1, 1) else None
-                )
+                self._sweep({one.slug for one in every} if done and plan.shard == (1, 1) else None)
             write_rows(out / "summary.parquet", _rows(result, records), _COLUMNS)
             write_text(out / "junit.xml", tilde(_junit(result, plan.request.check)))
             if not plan.request.no_report:
@@ -329,13 +308,12 @@ class _Batch:
                 footer = {"command": "rrrid batch", "version": __version__, "stage": plan.stage}
                 write_report(report, out, footer)
             write_text(out / "result.json", json_text(object_))
-            self._provenance(records)
+            write_text(out / PROVENANCE, json_text(tilde(self._about(records))))
         except EnvironmentFault:
             if self.fault is None:
                 raise
-        return Outcome(
-            result, object_, report, out, self._exit(result), (*result.checks, *self.notices)
-        )
+        checks = (*result.checks, *self.notices)
+        return Outcome(result, object_, report, out, self._exit(result), checks)
 
     def _sweep(self, slugs: set[str] | None) -> None:
         """Remove the earlier summary's page, drafts of dead processes, and items that are gone."""
@@ -349,22 +327,19 @@ class _Batch:
             for path in (self.out / "items").iterdir():
                 if path.name not in slugs:
                     self._discard(path.name)
-            lines = "".join(map(record_line, self.records.values()))
-            write_text(self.ledger, lines)
+            write_text(self.ledger, "".join(map(record_line, self.records.values())))
 
-    def _provenance(self, records: list[Record]) -> None:
-        files = [
-            path
-            for path in sorted(self.out.rglob("*"))
-            if path.is_file() and path.relative_to(self.out).parts[0] not in _APART
-        ]
+    def _about(self, records: list[Record]) -> dict[str, Any]:
+        """Return the provenance of the summary."""
+        names = (path.relative_to(self.out) for path in sorted(self.out.rglob("*")))
+        files = [n for n in names if n.parts[0] not in _APART and (self.out / n).is_file()]
         plan = self.plan
         options = {"jobs": plan.jobs, "backend": plan.backend, "shard": list(plan.shard)}
-        about = {
+        return {
             "tool": "rrrid",
             "version": __version__,
             "command": "batch",
-            "stage": self.plan.stage,
+            "stage": plan.stage,
             "key": self.key,
             "kept": self.kept,
             "options": _options(plan) | options,
@@ -374,10 +349,9 @@ class _Batch:
             "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(self.started)),
             "duration": time.time() - self.started,
             "inputs": {name: sha for record in records for name, sha in record.inputs.items()},
-            "outputs": {path.relative_to(self.out).as_posix(): hash_file(path) for path in files},
+            "outputs": {name.as_posix(): hash_file(self.out / name) for name in files},
             "items": {record.slug: record.provenance for record in records if record.provenance},
         }
-        write_text(self.out / PROVENANCE, json_text(tilde(about)))
 
     def _exit(self, result: Result) -> int:
         if self.heard:
@@ -402,10 +376,8 @@ def _key(plan: Plan) -> str:
     sources = read_sources()
     modules = [module_of(name) for name in STAGES] if plan.stage == "run" else [plan.module]
     code = {module: code_of(module, sources) for module in modules}
-    settings = encode(plan.settings)[0]
-    return digest_of_json(
-        [plan.module, settings, _options(plan), hashes, code, libraries(*_LIBRARIES)]
-    )
+    given = [plan.module, encode(plan.settings)[0], _options(plan)]
+    return digest_of_json([*given, hashes, code, libraries(*_LIBRARIES)])
 
 
 def read_ledger(out: Path) -> dict[str, Record]:
@@ -432,11 +404,9 @@ def is_intact(record: Record, folder: Path) -> bool:
     """Return whether an item's folder holds exactly what was written there (P10)."""
     if _hash(folder / PROVENANCE) != record.provenance:
         return False
-    outputs = provenance_of(folder)["outputs"]
+    outputs = {PROVENANCE: record.provenance, **provenance_of(folder)["outputs"]}
     there = {p.relative_to(folder).as_posix() for p in folder.rglob("*") if not p.is_dir()}
-    return there == {*outputs, PROVENANCE} and all(
-        _hash(folder / name) == sha for name, sha in outputs.items()
-    )
+    return there == set(outputs) and all(_hash(folder / n) == sha for n, sha in outputs.items())
 
 
 def result_of(stage: str, records: list[Record], checks: tuple[Check, ...]) -> Result:
@@ -459,7 +429,7 @@ def _rows(result: Result, records: list[Record]) -> list[dict[str, Any]]:
         for figure in (*drift.figures, *drift.residuals)
         for item, far in zip(figure.items, figure.away, strict=True)
     }
-    rows = []
+    rows: list[dict[str, Any]] = []
     for record in records:
         item, error = record.item, record.item.error
         about = {name: getattr(item, name, getattr(error, name, None)) for name in _COLUMNS}
@@ -467,10 +437,9 @@ def _rows(result: Result, records: list[Record]) -> list[dict[str, Any]]:
         numbers: dict[str, tuple[float, float | None, str]] = dict(record.figures)
         numbers |= {name: (value, None, unit) for name, (value, unit) in record.residuals.items()}
         for name, (value, std, unit) in numbers.items():
-            number = {"quantity": name, "value": value, "std": std, "unit": unit}
-            rows.append(about | number | {"away": away.get((name, item.name))})
-        if not numbers:
-            rows.append(about)
+            row = {"quantity": name, "value": value, "std": std, "unit": unit}
+            rows.append(about | row | {"away": away.get((name, item.name))})
+        rows += [] if numbers else [about]
     return rows
 
 
@@ -478,17 +447,12 @@ def _junit(result: Result, check: bool) -> str:
     """Return JUnit XML, a test case an item; with `check`, a finding is a failure."""
     kinds = {"rejected": "error", "failed": "error"} | ({"found": "failure"} if check else {})
     counts = Counter(kinds.get(item.status, "") for item in result.items)
-    suite = ElementTree.Element(
-        "testsuite",
-        name=f"rrrid batch {result.stage}",
-        tests=str(len(result.items)),
-        failures=str(counts["failure"]),
-        errors=str(counts["error"]),
-        skipped="0",
-    )
+    about = {"name": f"rrrid batch {result.stage}", "tests": str(len(result.items))}
+    about |= {"failures": str(counts["failure"]), "errors": str(counts["error"]), "skipped": "0"}
+    suite = ElementTree.Element("testsuite", about)
     for item in result.items:
-        name, stage = _plain(item.name), f"rrrid.{result.stage}"
-        case = ElementTree.SubElement(suite, "testcase", classname=stage, name=name)
+        about_case = {"classname": f"rrrid.{result.stage}", "name": _plain(item.name)}
+        case = ElementTree.SubElement(suite, "testcase", about_case)
         if item.status in kinds:
             code = item.error.code if item.error else item.status
             words = _plain(item.error.message if item.error else item.verdict)

@@ -186,11 +186,15 @@ def failed(plan: Plan, item: Item, problem: BaseException) -> Record:
 
 
 def run_items(
-    plan: Plan, waiting: deque[Item], stopped: Callable[[], bool], restarts: int = 3
+    plan: Plan, waiting: deque[Item], stopped: Callable[[], bool], seconds: float = 0.1
 ) -> Generator[tuple[Item, Record], None, None]:
     """Yield each item of `waiting` with its record as it is done, until `stopped()`.
 
-    Items that the caller appends meanwhile are run as well.
+    Items that the caller appends meanwhile are run as well. Some are kept in hand: the next one is
+    there when a worker is done with its last.
+
+    Args:
+        seconds: [s] between two looks whether to stop.
 
     Raises:
         UsageError: C02, no such backend.
@@ -198,59 +202,48 @@ def run_items(
     """
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")  # of the workers: there are as many as processors
+    if not waiting:
+        return
     pool = _local if plan.backend == "local" else _cluster
-    deaths = 0
-    while waiting and not stopped():
-        running: dict[Future[Record], Item] = {}
-        try:
-            most = sum(len(item.logs) for item in waiting)  # as many as there are sessions, at most
-            with pool(plan, max(1, min(plan.jobs, most))) as workers:
-                for item, problem, record in _results(workers, waiting, running, stopped):
-                    deaths = 0
-                    yield item, record or failed(plan, item, _fault(problem, plan))
-        except RuntimeError as problem:  # pebble's pool broke: a worker died that had no item
-            waiting.extendleft(reversed(running.values()))
-            deaths += 1
-            if deaths == restarts:
-                words = f"worker processes end before they begin: {problem}"
-                remedy = "raise --memory, or see the system's log"
-                raise EnvironmentFault("P04", words, where="batch", remedy=remedy) from None
-
-
-def _results(
-    workers: Workers,
-    waiting: deque[Item],
-    running: dict[Future[Record], Item],
-    stopped: Callable[[], bool],
-    seconds: float = 0.1,
-) -> Iterator[tuple[Item, BaseException | None, Record | None]]:
-    """Keep some items in hand: the next one is there when a worker is done with its last."""
-    while (waiting or running) and not stopped():
-        if not workers.alive():
-            raise _gone()
-        while waiting and len(running) < workers.ahead:
-            running[workers.submit(waiting[0])] = waiting[0]
-            waiting.popleft()
-        for future in wait(running, timeout=seconds, return_when=FIRST_COMPLETED).done:
-            if future.cancelled():
+    most = sum(len(item.logs) for item in waiting)  # as many as there are sessions, at most
+    running: dict[Future[Record], Item] = {}
+    with pool(plan, max(1, min(plan.jobs, most))) as workers:
+        while (waiting or running) and not stopped():
+            while waiting and len(running) < workers.ahead:
+                future = workers.submit(waiting[0])
+                running[future] = waiting.popleft()
+            if not workers.alive():
                 raise _gone()
-            problem = future.exception()
-            if isinstance(problem, BrokenProcessPool):
-                raise problem
-            if stopped():  # the signal went to the workers as well: no item ended them
-                return
-            yield running.pop(future), problem, None if problem else future.result()
+            for future in wait(running, timeout=seconds, return_when=FIRST_COMPLETED).done:
+                if future.cancelled():
+                    raise _gone()
+                problem = future.exception()
+                if stopped():  # the signal went to the workers as well: no item ended them
+                    return
+                if isinstance(problem, BrokenProcessPool):
+                    raise _fault(problem, plan)
+                record = failed(plan, running[future], _fault(problem, plan)) if problem else None
+                yield running.pop(future), record or future.result()
+
+
+def _gone() -> EnvironmentFault:
+    remedy = "start it again, and go on with --resume"
+    return EnvironmentFault("P04", "the scheduler went away", "--backend", remedy)
 
 
 def _fault(problem: Any, plan: Plan) -> Any:
     """Return the fault behind an exception of pebble or Dask (P04, P05)."""
+    kind = type(problem).__name__
     if isinstance(problem, TimeoutError) and plan.timeout is not None:
         words = f"timeout: not done within {plan.timeout:g} s"
         return EnvironmentFault("P05", words, remedy="raise --timeout, or look at the item alone")
-    if type(problem).__name__ == "ProcessExpired":
+    if kind == "ProcessExpired":
         return _crashed(problem.exitcode)
-    if type(problem).__name__ == "KilledWorker":
+    if kind == "KilledWorker":
         return EnvironmentFault("P04", "crashed: every worker that had it died", remedy=_ALONE)
+    if isinstance(problem, BrokenProcessPool):
+        words, remedy = "worker processes end before they begin", "raise --memory, and --resume"
+        return EnvironmentFault("P04", words, "batch", remedy)
     return problem
 
 
@@ -294,7 +287,9 @@ def _local(plan: Plan, jobs: int) -> Iterator[Workers]:
         except (OSError, ImportError) as problem:
             words = f"no worker can be started, for there is no shared memory: {problem}"
             remedy = "make room in /dev/shm and let it be writable, or run the stage without batch"
-            raise EnvironmentFault("P04", words, where="batch", remedy=remedy) from None
+            raise EnvironmentFault("P04", words, "batch", remedy) from None
+        except RuntimeError as problem:
+            raise _fault(BrokenProcessPool(problem), plan) from None
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
@@ -326,11 +321,6 @@ def _end_with_parent(parent: int, seconds: float = 0.2) -> None:
     while os.getppid() == parent:
         time.sleep(seconds)
     os._exit(1)
-
-
-def _gone() -> EnvironmentFault:
-    remedy = "start it again, and go on with --resume"
-    return EnvironmentFault("P04", "the scheduler went away", where="--backend", remedy=remedy)
 
 
 @contextlib.contextmanager

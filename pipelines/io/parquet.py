@@ -25,6 +25,7 @@ os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
 _KEY = b"rrrid"
 _COLUMN = re.compile(r"(?P<signal>[a-z_]+?)(?:_(?P<joint>[1-9]\d{0,2}))?")
 _AGAIN = "copy the file again from where it was recorded"
+_TABLE: dict[str, Any] = {"compression": "zstd", "write_page_checksum": True}
 
 
 def write(path: Path, parts: Answer) -> None:
@@ -198,29 +199,18 @@ def csv_cell(text: str) -> str:
 def write_table(path: Path, columns: Mapping[str, Array], units: Mapping[str, str]) -> None:
     """Write named columns with their units as Parquet, page checksums included."""
     import pyarrow as pa
+    import pyarrow.parquet as pq
 
     fields = [
         pa.field(name, pa.float64(), metadata={"units": units.get(name, "1")}) for name in columns
     ]
-    _write_arrow(path, [pa.array(values) for values in columns.values()], pa.schema(fields))
+    table = pa.table([pa.array(values) for values in columns.values()], schema=pa.schema(fields))
+    write_file(path, lambda draft: pq.write_table(table, draft, **_TABLE))
 
 
-def write_rows(
-    path: Path, rows: Sequence[Mapping[str, str | float | int | None]], kinds: Mapping[str, type]
-) -> None:
-    """Write rows of named cells as Parquet; `kinds`: column -> str, float or int."""
-    import pyarrow as pa
+def write_rows(path: Path, rows: Sequence[Mapping[str, object]], kinds: Mapping[str, str]) -> None:
+    """Write rows of named cells as Parquet; `kinds`: column -> type of pandas."""
+    import pandas as pd
 
-    arrow = {str: pa.string(), float: pa.float64(), int: pa.int64()}
-    schema = pa.schema([pa.field(name, arrow[kind]) for name, kind in kinds.items()])
-    columns = [pa.array([row.get(n) for row in rows], type=arrow[k]) for n, k in kinds.items()]
-    _write_arrow(path, columns, schema)
-
-
-def _write_arrow(path: Path, columns: list[Any], schema: Any) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    table = pa.table(columns, schema=schema)
-    options = {"compression": "zstd", "write_page_checksum": True}
-    write_file(path, lambda draft: pq.write_table(table, draft, **options))
+    table = pd.DataFrame(rows, columns=list(kinds)).astype(dict(kinds))
+    write_file(path, lambda draft: table.to_parquet(draft, index=False, **_TABLE))

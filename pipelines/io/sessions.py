@@ -26,6 +26,10 @@ from pipelines.io.robot_files import load_robot
 Key = tuple[str, str, str]  # robot's name, its description, day
 
 
+def silent(words: str) -> None:
+    """Report no progress: a function by name, which a worker process can be given."""
+
+
 @dataclass(frozen=True)
 class Request:
     """The request of the user to any stage: inputs, and options that every command takes."""
@@ -39,8 +43,7 @@ class Request:
     no_report: bool = False
     assume_units: bool = False
     format: str = "h5"  # of derived logs
-    # progress, in words
-    tell: Callable[[str], None] = field(default=lambda words: None, compare=False)
+    tell: Callable[[str], None] = field(default=silent, compare=False)  # progress, in words
     joints: tuple[int, ...] = ()  # 1-based: the joints of every log, in this order; none: all
     # role -> paths of logs that have it, instead of their attribute
     roles: Mapping[str, Sequence[str]] = field(default_factory=dict)
