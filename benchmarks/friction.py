@@ -22,11 +22,11 @@ import statistics
 
 import numpy as np
 
+from benchmarks.textbook_kalman import ExtendedTextbook
 from pipelines.friction.ekf import joint_step
 from pipelines.friction.fit import LawFit
 from pipelines.friction.laws import OneJoint, law_named
 from pipelines.friction.refine import fit_driven_alone
-from pipelines.signal.kalman import ExtendedTextbook
 from tests.friction.one_joint import (
     ENCODER,
     INERTIA,

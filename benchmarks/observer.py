@@ -33,9 +33,9 @@ from itertools import product
 import numpy as np
 from filterpy.kalman import KalmanFilter
 
-from pipelines.signal.chain import held_input, transition
-from pipelines.signal.observer import Start, design, observe
-from pipelines.signal.smoother import Smoother, smooth
+from pipelines.estimation.chain import held_input, transition
+from pipelines.estimation.smoother import smooth
+from pipelines.estimation.state_estimation import Start, design, observe
 
 T, STEP = 1e-3, 1e-5
 SIGMA, R = np.array([200.0, 500.0, 3770.0]), STEP**2 / 12
@@ -110,10 +110,9 @@ def error(states: np.ndarray, reference: np.ndarray) -> float:
 def compare(samples: int, with_statsmodels: bool) -> None:
     y, size = measured(samples), f"{samples:.0e} × 3"
     observer = design(T, SIGMA, R)
-    smoother = Smoother(observer)
     for name, ours, theirs, kept in (
         ("observer", observe, their_observer, observer),
-        ("smoother", smooth, their_smoother, smoother),
+        ("smoother", smooth, their_smoother, observer),
     ):
         reference = theirs(y)
         for of, start in product((kept, None), (START, None)):
@@ -127,33 +126,29 @@ def compare(samples: int, with_statsmodels: bool) -> None:
             contest = race(run, partial(theirs, y), repeats=5)
             print(row(f"{size}, {title}", contest, apart, 0.0), flush=True)
     if with_statsmodels:
-        known = partial(smooth, y, smoother, START)
+        known = partial(smooth, y, observer, START)
         contest = race(known, partial(statsmodels_smoother, y), repeats=5)
         apart = error(known().states, statsmodels_smoother(y))
         print(row(f"{size}, smoother, against statsmodels", contest, apart, 0.0), flush=True)
 
 
 def grow(largest: int) -> None:
-    """Time and memory of ours from 1e4 samples upwards, and the exponent of the time, in new memory
-    and in memory kept.
-    """
+    """Time and memory of ours from 1e4 samples upwards, and the exponent of the time."""
     observer = design(T, SIGMA, R)
-    smoother = Smoother(observer)
     sizes = [n for n in (10_000, 30_000, 100_000, 300_000, 1_000_000, 3_000_000) if n <= largest]
     for name, run in (
         ("observer", partial(observe, observer=observer)),
-        ("smoother", partial(smooth, observer=smoother)),
+        ("smoother", partial(smooth, observer=observer)),
     ):
-        for memory in ("memory kept", "new memory"):
-            seconds = []
-            for n in sizes:
-                y, out = measured(n), np.zeros((3, 3, n)) if memory == "memory kept" else None
-                seconds.append(best(partial(run, y, out=out)))
-            slope = np.polyfit(np.log(sizes), np.log(seconds), 1)[0]
-            times = ", ".join(
-                f"{n:.0e} in {s * 1e3:.1f} ms" for n, s in zip(sizes, seconds, strict=True)
-            )
-            print(f"{name}, {memory}: {times}; exponent {slope:.3f}", flush=True)
+        seconds = []
+        for n in sizes:
+            y = measured(n)
+            seconds.append(best(partial(run, y)))
+        slope = np.polyfit(np.log(sizes), np.log(seconds), 1)[0]
+        times = ", ".join(
+            f"{n:.0e} in {s * 1e3:.1f} ms" for n, s in zip(sizes, seconds, strict=True)
+        )
+        print(f"{name}: {times}; exponent {slope:.3f}", flush=True)
         tracemalloc.start()
         run(y)
         peak = tracemalloc.get_traced_memory()[1] - y.size * 24

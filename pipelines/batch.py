@@ -54,7 +54,7 @@ from pipelines.stage import Outcome
 
 # The commands that read a folder of logs and nothing else.
 STAGES = ("run", "convert", "simulate", *(module.replace("_", "-") for module in STEPS))
-_LIBRARIES = ("numpy", "scipy", "h5py", "pyarrow", "pandas", "matplotlib", "filterpy", "jinja2")
+_LIBRARIES = ("numpy", "scipy", "h5py", "pyarrow", "pandas", "matplotlib", "jinja2")
 _MARK = "batch.json"
 _APART = {"items", "ledger", "crashes"}  # what result.json and the page are made of
 _OURS = _APART | {"figures", _MARK, "report.html", "summary.parquet", "junit.xml", "result.json"}

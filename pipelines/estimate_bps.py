@@ -16,6 +16,9 @@ from pipelines.dynamics.parameter import Uncertainty
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
+from pipelines.estimation.mean_period import doubts
+from pipelines.estimation.motion import Reconstructed, for_equations, reconstruct
+from pipelines.estimation.observers import Reconstruction
 from pipelines.fit.identifiability import hard_to_see, not_separated
 from pipelines.io.files import write_log
 from pipelines.io.log import ExperimentLog, derive, digest_of, recording
@@ -51,10 +54,7 @@ from pipelines.model.estimation.rests import without_stiction
 from pipelines.model.estimation.result import Result
 from pipelines.model.estimation.words import columns_in_words
 from pipelines.model.excited import REMEDY
-from pipelines.model.mean_period import doubts
-from pipelines.model.motion import Reconstructed, for_equations, reconstruct
 from pipelines.model.plausibility import mismatches
-from pipelines.model.tuned import Reconstruction
 from pipelines.quality.checks import Subject, accepted
 from pipelines.report.bps_report import bps_report
 from pipelines.report.report import Report

@@ -20,6 +20,7 @@ import numpy as np
 
 from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import Check, Gathering, InputRejected, UsageError
+from pipelines.estimation.grids import grid, resample
 from pipelines.importers.assemble import Map, Material, Source, assemble, collect, parse_map
 from pipelines.importers.config import REPAIR
 from pipelines.importers.guess import Draft, guess_recipe
@@ -38,7 +39,6 @@ from pipelines.io.robot import RobotDescription
 from pipelines.io.sandbox import regular_file
 from pipelines.quality.subject import many
 from pipelines.report.report import Figure, Report, Section, Table
-from pipelines.signal.resample import grid, resample
 from pipelines.stage import Inputs, Request, Stage, slug
 
 

@@ -194,14 +194,14 @@ def _periods(subject: Subject, opened: Opened) -> list[Check]:
     if not subject.sampled or log.period is None or not subject.good.runs:
         return []
     # observers, for the few logs that have periods
+    from pipelines.estimation.mean_period import doubts, mean_period
+    from pipelines.estimation.motion import Reconstruction, reconstruct
     from pipelines.model.estimation.conditioning import cutoff_at, wanted_cutoff
-    from pipelines.model.mean_period import doubts, noise_floor
-    from pipelines.model.motion import Reconstruction, reconstruct
 
     found = reconstruct(log, Reconstruction(), subject.good)
     rate = 1.0 / log.sample_time
     cutoff = cutoff_at(wanted_cutoff(found.motion, rate), rate)
-    return doubts(noise_floor(log, found, cutoff), opened.path)
+    return doubts(mean_period(log, found, cutoff)[0], opened.path)
 
 
 def _torque(

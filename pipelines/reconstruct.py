@@ -22,20 +22,12 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import Check, InputRejected, NothingMatched
+from pipelines.estimation.mean_period import doubts
+from pipelines.estimation.motion import Reconstruction, reconstruct
+from pipelines.estimation.motion_result import LogResult, ObserverResult, assess
 from pipelines.io.files import Opened, open_log, write_log
 from pipelines.io.log import Array, derive, recording
 from pipelines.io.robot import RobotDescription, format_robot
-from pipelines.model.mean_period import doubts
-from pipelines.model.motion import Reconstruction, reconstruct
-from pipelines.model.motion_result import (
-    LogResult,
-    ObserverResult,
-    Place,
-    alarm,
-    assess,
-    coloured,
-    straying,
-)
 from pipelines.quality.checks import Subject, accepted
 from pipelines.report.config import REPORT
 from pipelines.report.motion_report import motion_report
@@ -109,8 +101,8 @@ def _motion(
     checks = accepted(subject)
     found = reconstruct(log, settings, subject.good)
     derived = derive(log, "reconstruct", settings.as_settings(), found.signals())
-    place, drawn = Place(opened.path.name, file), len(before) < REPORT.reconstructed
-    result = assess(log, found, settings, place, derived, drawn)
+    drawn = len(before) < REPORT.reconstructed
+    result = assess(log, found, settings, (opened.path.name, file), derived, drawn)
     checks += doubts(result.noise_floor, opened.path, settings.average)
     return result, [*checks, *_warnings(result, settings, opened.path)]
 
@@ -118,30 +110,28 @@ def _motion(
 def _warnings(log: LogResult, settings: Settings, path: Path) -> list[Check]:
     """D12: a motion far from the measured one. C02: settings that make deviations meaningless."""
     found = []
-    if far := straying(log):
+    if far := log.straying:
+        joints = ", ".join(map(str, far))
         worst = max(float(log.reconstruction_error_max[j - 1]) for j in far)
-        limit = max(float(alarm(log)[j - 1]) for j in far)
-        words = f"the reconstructed position of joint {_listed(far)} is up to {worst:.2g} rad from "
+        limit = max(float(log.alarm[j - 1]) for j in far)
+        words = f"the reconstructed position of joint {joints} is up to {worst:.2g} rad from "
         words += f"the measured one, more than {limit:.3g} rad"
         remedy = "allow more jerk or bandwidth, or look for jumps and slips of the encoder"
         found.append(Check.of("D12", "warn", words, where=path, gate=True, remedy=remedy))
     forced = settings.jerk_std is not None or settings.bandwidth is not None
-    correlated = coloured(log)
+    correlated = log.coloured
     if forced and correlated and not np.isnan(log.speed_std).all():
-        words = f"with these settings the innovations of joint {_listed(correlated)} are strongly "
+        joints = ", ".join(map(str, correlated))
+        words = f"with these settings the innovations of joint {joints} are strongly "
         words += "coloured; the stated standard deviations hold only where they are white"
         remedy = "leave --jerk-std and --bandwidth to be found from the data"
         found.append(Check.of("C02", "warn", words, where=path, remedy=remedy))
     return found
 
 
-def _listed(joints: tuple[int, ...]) -> str:
-    return ", ".join(map(str, joints))
-
-
 def exit_code(result: Result, check: bool) -> int:
     """Return 1 with --check where a position is farther from the measured one than the paper's."""
-    return int(check and any(straying(log) for log in result.logs))
+    return int(check and any(log.straying for log in result.logs))
 
 
 def write(result: Result, folder: Path, request: Request) -> None:

@@ -48,7 +48,7 @@ STEPS = (
     "extend",
 )
 MODULES = tuple(f"pipelines.{module}" for module in ("run", *STEPS))
-_LIBRARIES = ("numpy", "scipy", "h5py", "pyarrow", "pandas", "filterpy")
+_LIBRARIES = ("numpy", "scipy", "h5py", "pyarrow", "pandas")
 
 
 @dataclass(frozen=True)

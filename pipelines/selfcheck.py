@@ -165,9 +165,9 @@ def _fitted(log: ExperimentLog, close: float = 6.0) -> str:
     Args:
         close: [std] a fit of three sessions is never so far off.
     """
+    from pipelines.estimation.motion import Reconstruction, reconstruct
     from pipelines.model.estimation.logs import Recipe, fit_logs, with_cutoff
     from pipelines.model.estimation.nominal import nominal_columns
-    from pipelines.model.motion import Reconstruction, reconstruct
     from pipelines.simulation.example import example_arm
 
     how = Reconstruction()

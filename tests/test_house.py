@@ -16,7 +16,7 @@ REPO = Path(__file__).resolve().parents[1]
 CONSTANTS = {
     "pipelines/diagnose.py": 1, "pipelines/diagnosis": 9, "pipelines/estimate_bps.py": 1,
     "pipelines/estimation": 30, "pipelines/fit": 41,
-    "pipelines/model": 170, "pipelines/report": 63, "pipelines/signal": 29,
+    "pipelines/model": 141, "pipelines/report": 63,
 }
 
 

@@ -14,11 +14,11 @@ from scipy.linalg import solve_discrete_are
 
 from pipelines import reconstruct
 from pipelines.errors import InputRejected, NothingMatched
+from pipelines.estimation.chain import held_input, transition
+from pipelines.estimation.motion import Reconstruction
+from pipelines.estimation.motion import reconstruct as motion_of
 from pipelines.io.files import open_log, write_log
 from pipelines.io.log import ExperimentLog, recording
-from pipelines.model.motion import Reconstruction
-from pipelines.model.motion import reconstruct as motion_of
-from pipelines.signal.chain import held_input, transition
 from pipelines.stage import Outcome, Request, run_stage
 from tests.cli.commands import rrrid
 from tests.fault_table import FAULTS

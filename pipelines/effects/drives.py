@@ -10,10 +10,10 @@ from typing import Any, Self
 import numpy as np
 
 from pipelines.dynamics.body import Array, Motion
+from pipelines.dynamics.first_order import continuous, held_mean, lagging, later, rate_of_change
 from pipelines.dynamics.functions import ARRAYS, Functions
 from pipelines.effects.base import ArmModel, Effect, FrictionLaw, Hooks, Values, predicted
 from pipelines.effects.config import EFFECTS
-from pipelines.signal.first_order import continuous, held_mean, lagging, later, rate_of_change
 
 __all__ = [
     "DriveLag",

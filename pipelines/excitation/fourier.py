@@ -22,7 +22,7 @@ import numpy.typing as npt
 from pipelines.dynamics.body import Array
 from pipelines.errors import UsageError
 from pipelines.excitation.config import CONFIG
-from pipelines.signal import fourier
+from pipelines.simulation import fourier_series as fourier
 
 __all__ = ["Harmonics", "MotionSpace", "Trajectory", "plan_harmonics", "quintics"]
 

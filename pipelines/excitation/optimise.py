@@ -28,7 +28,7 @@ from pipelines.excitation.problem import DesignProblem
 from pipelines.excitation.regressor import grams_of
 from pipelines.excitation.task import Task
 from pipelines.excitation.verify import Peak, worst
-from pipelines.signal.fourier import good_size
+from pipelines.simulation.fourier_series import good_size
 
 __all__ = ["Design", "Effort", "design", "final_problem", "finished", "landscape"]
 

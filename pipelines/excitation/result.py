@@ -12,6 +12,7 @@ import numpy as np
 from pipelines.dynamics import rrr
 from pipelines.dynamics.body import Array, Motion
 from pipelines.errors import Check, UsageError
+from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.excitation.config import CONFIG
 from pipelines.excitation.discrimination import Apart, Found
 from pipelines.excitation.fourier import Trajectory
@@ -24,7 +25,6 @@ from pipelines.excitation.verify import Peak
 from pipelines.importers.units import ControllerTable
 from pipelines.io.log import ExperimentLog, Signal
 from pipelines.io.results import NOT_STORED
-from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.writing.task import planned_log
 
 __all__ = ["Compared", "Course", "DrawnPlan", "ParameterStd", "Result", "beyond_words",

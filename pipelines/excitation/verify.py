@@ -18,7 +18,7 @@ from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.kinematics import SerialChain
 from pipelines.excitation.config import CONFIG
 from pipelines.excitation.constraints import Limit, tip_motion
-from pipelines.signal import fourier
+from pipelines.simulation import fourier_series as fourier
 
 __all__ = ["Peak", "peaks", "torque_of", "worst"]
 

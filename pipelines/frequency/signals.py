@@ -18,12 +18,12 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
+from pipelines.estimation.grids import through
 from pipelines.frequency.config import TurningConfig
 from pipelines.frequency.spectra import Array, Mask
 from pipelines.io.limits import GAP_LIMIT, LARGEST_JITTER, SHORTEST, percent
 from pipelines.io.log import Controller, ExperimentLog
 from pipelines.quality.segments import Usable, usable
-from pipelines.signal.resample import through
 
 __all__ = ["INPUT", "POSITION", "TORQUE", "Stretch", "Turned", "V", "excitation_period"]
 __all__ += ["turned_joint"]

@@ -18,10 +18,10 @@ import numpy as np
 from pipelines.dynamics.body import Array
 from pipelines.errors import UsageError
 from pipelines.friction.config import EkfConfig
+from pipelines.friction.extended_filter import Advance, Extended, filter_extended
 from pipelines.friction.fit import LawEquations, LawFit, fit_law
 from pipelines.friction.laws import OneJoint, law_named
 from pipelines.friction.weak_form import Stretch
-from pipelines.signal.extended import Advance, Extended, filter_extended
 
 __all__ = ["EKF_NAMES", "EkfStart", "filtered", "joint_step", "run_ekf"]
 

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Sequence
 
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.parameter import Parameter
+from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.friction.config import FolderConfig
 from pipelines.friction.joint import JointLogs, fit_joint, friction_of
 from pipelines.friction.laws import law_named
@@ -29,7 +30,6 @@ from pipelines.model.estimation.logs import (
     with_cutoff,
 )
 from pipelines.model.estimation.nominal import fitted_arm, nominal_columns
-from pipelines.model.motion import Reconstruction, reconstruct
 
 __all__ = ["fitted_in_folder"]
 

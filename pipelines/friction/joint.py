@@ -18,6 +18,7 @@ from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Array, Motion
 from pipelines.effects import find_effect
 from pipelines.errors import InputRejected
+from pipelines.estimation.motion import Reconstructed, encoder_resolution
 from pipelines.fit.varpro import with_block_covariance
 from pipelines.friction.breakaway import Event, break_away, held_at_least
 from pipelines.friction.config import JointConfig, SlidingConfig
@@ -44,7 +45,6 @@ from pipelines.friction.weak_form import (
 )
 from pipelines.io.log import ExperimentLog
 from pipelines.io.robot import RobotDescription
-from pipelines.model.motion import Reconstructed, encoder_resolution
 
 __all__ = ["METHODS", "JointFit", "JointLogs", "Seen", "by_method", "fit_joint", "fractions",
            "friction_of"]

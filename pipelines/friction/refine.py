@@ -19,14 +19,14 @@ import numpy as np
 
 from pipelines.dynamics.body import Array
 from pipelines.errors import InputRejected
+from pipelines.estimation.smoother import smooth
+from pipelines.estimation.state_estimation import design
+from pipelines.estimation.tuning import tune_smoother
 from pipelines.fit.varpro import SeparableFit, search
 from pipelines.friction.config import RefineConfig
 from pipelines.friction.fit import LawEquations, LawFit, fit_law, ranked
 from pipelines.friction.laws import Law, OneJoint, gravity_columns
 from pipelines.friction.weak_form import Mask, Stretch
-from pipelines.signal.observer import design
-from pipelines.signal.smoother import smooth
-from pipelines.signal.tuning import tune_smoother
 
 __all__ = ["fit_driven_alone", "refined"]
 

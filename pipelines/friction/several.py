@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.dynamics.body import Array, Motion
+from pipelines.estimation.filters import LowPass, centre_samples, zero_phase
 from pipelines.friction.fit import Columns, Equations
 from pipelines.friction.laws import LADDER, Law, OneJoint
 from pipelines.friction.model_selection import Ladder, climb
@@ -30,7 +31,6 @@ from pipelines.model.estimation.logs import (
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import Columns as RigidColumns
 from pipelines.model.estimation.regression import LogEquations
-from pipelines.signal.filters import LowPass, centre_samples, zero_phase
 
 __all__ = ["RowEquations", "SeveralFit", "fit_several"]
 

@@ -25,13 +25,13 @@ import numpy.typing as npt
 
 from pipelines.dynamics.body import Array, Motion
 from pipelines.errors import InputRejected
+from pipelines.estimation.motion import Reconstructed, encoder_resolution
+from pipelines.estimation.smoother import smooth
+from pipelines.estimation.state_estimation import design
+from pipelines.estimation.tuning import tune_jerk
 from pipelines.friction.config import WeakFormConfig
 from pipelines.friction.laws import gravity_acts, gravity_columns
 from pipelines.io.log import ExperimentLog
-from pipelines.model.motion import Reconstructed, encoder_resolution
-from pipelines.signal.observer import design
-from pipelines.signal.smoother import smooth
-from pipelines.signal.tuning import tune_jerk
 
 __all__ = ["Course", "Mask", "Stretch", "Sway", "Windows", "blocks_of_time", "moved",
            "stretches_of", "sway_columns", "swaying"]

@@ -13,12 +13,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipelines.errors import Check, InputRejected
+from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.io.log import recording
 from pipelines.model.estimation.estimate import Estimate, estimate
 from pipelines.model.estimation.logs import Recipe, equations_of, with_cutoff
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.words import columns_in_words
-from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.quality.subject import NotTested, Subject
 
 __all__ = ["REMEDY", "excitation", "excited"]

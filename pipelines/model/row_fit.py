@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.dynamics.body import Array, RigidBody
+from pipelines.estimation.filters import apply_kernel, half_width, kernel, local_polynomial
 from pipelines.quality.segments import Usable
-from pipelines.signal.derivatives import apply_kernel, half_width, kernel, local_polynomial
 
 __all__ = ["Row", "Sampled", "quick_residual", "relative_residual", "row_columns", "row_fits", "sample_motion",
            "shared_residual"]
@@ -85,11 +85,11 @@ def _sample_run(good: Usable, run: slice, half: int, reach: int, spacing: int) -
     tau = _filled(grid, t, log.tau[run], good.torque_spikes[run] | stale)
     if log.torque != "measured":  # held until the next sample: its middle lies half a sample later
         tau[1:] = 0.5 * (tau[1:] + tau[:-1])
-    motion = local_polynomial(q, ts, half)
+    value, first, second = local_polynomial(q, ts, half)
     # speeds far below the usual say nothing about the sign of friction
-    slow = np.minimum(0.01, 0.02 * np.sqrt(np.mean(motion.first**2, axis=0)) + 1e-12)
+    slow = np.minimum(0.01, 0.02 * np.sqrt(np.mean(first**2, axis=0)) + 1e-12)
     smooth = kernel(half, 4, 0)
-    coulomb = apply_kernel(np.tanh(motion.first / slow), smooth)
+    coulomb = apply_kernel(np.tanh(first / slow), smooth)
     torque = apply_kernel(tau, smooth)
     moments = np.arange(half + reach, samples - 3 * half - reach, spacing)  # in samples of `motion`
     if not moments.size:
@@ -97,7 +97,7 @@ def _sample_run(good: Usable, run: slice, half: int, reach: int, spacing: int) -
     spoilt = np.interp(grid, t, good.saturated[run].any(axis=1).astype(float))
     clean = apply_kernel(spoilt[:, None], np.full(2 * half + 1, 1.0))[:, 0] < 0.5
     moments = moments[clean[moments]]
-    return (grid[moments + half], motion.value[moments], motion.first[moments], motion.second[moments],
+    return (grid[moments + half], value[moments], first[moments], second[moments],
             coulomb[moments - half], torque, moments.astype(float))
 
 

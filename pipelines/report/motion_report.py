@@ -9,17 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.model.mean_period import NoiseFloor
-from pipelines.model.motion_result import (
-    ALARM,
-    SLIGHT,
-    LogResult,
-    ObserverResult,
-    Series,
-    alarm,
-    coloured,
-    straying,
-)
+from pipelines.estimation.config import ResultConfig
+from pipelines.estimation.mean_period import NoiseFloor
+from pipelines.estimation.motion_result import LogResult, ObserverResult, Series
+from pipelines.estimation.state_estimation import design
 from pipelines.report import style
 from pipelines.report.figures import (
     DASHED,
@@ -36,7 +29,6 @@ from pipelines.report.sections import further_logs
 from pipelines.report.sentences import paragraphs, sentence
 from pipelines.report.style import format_number
 from pipelines.report.words import joined
-from pipelines.signal.observer import design
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,7 +42,7 @@ _say, _paragraphs = partial(sentence, "motion"), partial(paragraphs, "motion")
 
 def motion_report(logs: Sequence[LogResult]) -> Report:
     """Verdict, key figures, one section a log."""
-    far, doubtful = [log for log in logs if straying(log)], [log for log in logs if coloured(log)]
+    far, doubtful = [log for log in logs if log.straying], [log for log in logs if log.coloured]
     known = not all(np.isnan(log.speed_std).all() for log in logs)
     verdict = _say("verdict", logs, _known(logs), _whiteness(logs, doubtful), _strays(far))
     tone: Tone = "attention" if far or doubtful else "good" if known else "neutral"
@@ -81,8 +73,10 @@ def _whiteness(logs: Sequence[LogResult], doubtful: Sequence[LogResult]) -> str:
         return ""  # nothing is stated that whiteness could support
     if doubtful:
         name = doubtful[0].name if len(logs) > 1 else ""
-        joints = coloured(doubtful[0])
-        return _say("whiteness", "coloured", joints, name, len(doubtful) - 1, 0.0, SLIGHT)
+        joints = doubtful[0].coloured
+        return _say(
+            "whiteness", "coloured", joints, name, len(doubtful) - 1, 0.0, ResultConfig().slight
+        )
     correlations = [
         (text.split(":")[0].split(",")[0], text, value)
         for log in logs
@@ -92,7 +86,7 @@ def _whiteness(logs: Sequence[LogResult], doubtful: Sequence[LogResult]) -> str:
     nearly = [value for _, text, value in correlations if text.startswith("nearly")]
     kind = "nearly white" if "nearly white" in words else "white"
     kind = "at rest" if words == {"none"} else kind
-    return _say("whiteness", kind, (), "", 0, max(nearly, default=0.0), SLIGHT)
+    return _say("whiteness", kind, (), "", 0, max(nearly, default=0.0), ResultConfig().slight)
 
 
 def _strays(far: Sequence[LogResult]) -> dict[str, object] | None:
@@ -100,16 +94,16 @@ def _strays(far: Sequence[LogResult]) -> dict[str, object] | None:
     if not far:
         return None
     places = [
-        (float(log.reconstruction_error_max[j - 1]), log, j) for log in far for j in straying(log)
+        (float(log.reconstruction_error_max[j - 1]), log, j) for log in far for j in log.straying
     ]
     error, log, joint = max(places, key=lambda place: place[0])
-    limit, noise = alarm(log)[joint - 1], float(log.observer.measurement_std[joint - 1])
+    limit, noise = log.alarm[joint - 1], float(log.observer.measurement_std[joint - 1])
     return {
         "joint": joint,
         "log": log,
         "error": error,
         "limit": float(limit),
-        "published": float(limit) == ALARM,
+        "published": float(limit) == ResultConfig().alarm,
         "noise": noise,
         "chance": error < _CHANCE * noise,
         "logs": len(far),
@@ -165,7 +159,7 @@ def _largest(values: Array) -> float | None:
 
 
 def _log_section(log: LogResult, series: Series, first: bool) -> Section:
-    doubtful = coloured(log)
+    doubtful = log.coloured
     stated = not np.isnan(log.speed_std).all()
     innovations = _innovations(log) if first or doubtful else []
     text = _paragraphs("log", log, innovations, doubtful if stated else ())
@@ -211,7 +205,7 @@ def _tables(log: LogResult) -> list[Table]:
     }
     leads_to = "The motion it leads to; std: standard deviation in the middle of all samples."
     tables = [
-        columns_table({"joint": joints} | observer, _say("observer", SLIGHT)),
+        columns_table({"joint": joints} | observer, _say("observer", ResultConfig().slight)),
         columns_table({"joint": joints} | known, leads_to),
     ]
     if log.noise_floor is not None:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.estimation.filters import welch
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.signal.spectra import welch
 from pipelines.simulation.config import SIMULATION
 from pipelines.simulation.replay import Windows
 
@@ -39,8 +39,9 @@ class Course:
     drift: Array | None  # [rad] rms of the position's difference by then (points, joints)
 
 
-def course(log: ExperimentLog, q: Pair, dq: Pair, tau: Pair | None,
-           windows: Windows | None = None) -> Course:
+def course(
+    log: ExperimentLog, q: Pair, dq: Pair, tau: Pair | None, windows: Windows | None = None
+) -> Course:
     """Return the series of one log; each pair is measured and simulated (samples, joints)."""
     size = max(1, -(-log.n_samples // SIMULATION.stretches))
     first = np.arange(0, log.n_samples, size)
@@ -58,26 +59,41 @@ def course(log: ExperimentLog, q: Pair, dq: Pair, tau: Pair | None,
         missed = tau[1] - tau[0]
         torque, applied, missing = (_envelope(x, size) for x in (*tau, missed))
         torque_density = None if frequency is None else _spectrum(missed, time)[1]
-    return Course(t, measured, simulated, difference, speed, moved, torque, applied, missing,
-                  frequency, density, torque_density, elapsed, drift)
+    return Course(
+        t,
+        measured,
+        simulated,
+        difference,
+        speed,
+        moved,
+        torque,
+        applied,
+        missing,
+        frequency,
+        density,
+        torque_density,
+        elapsed,
+        drift,
+    )
 
 
 def _spectrum(x: Array, sample_time: float) -> tuple[Array, Array] | tuple[None, None]:
     """Density of the longest stretch without a gap."""
     known = np.isfinite(x).all(axis=1)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], known,
-                                                   [False]]).astype(np.int8))).reshape(-1, 2)
+    edges = np.flatnonzero(
+        np.diff(np.concatenate([[False], known, [False]]).astype(np.int8))
+    ).reshape(-1, 2)
     start, stop = max(edges.tolist(), key=lambda edge: edge[1] - edge[0], default=(0, 0))
     if stop - start < SIMULATION.fewest:
         return None, None
-    found = welch(x[start:stop], 1.0 / sample_time, SIMULATION.segment)
-    return found.frequency, found.density
+    return welch(x[start:stop], 1.0 / sample_time, SIMULATION.segment)
 
 
 def _drift(off: Array, windows: Windows, sample_time: float) -> tuple[Array, Array]:
     rows = windows.first[:, None] + np.arange(windows.length)
     return sample_time * np.arange(windows.length, dtype=np.float64), np.sqrt(
-        np.mean(off[rows]**2, axis=0))
+        np.mean(off[rows] ** 2, axis=0)
+    )
 
 
 def _envelope(x: Array, size: int) -> Array:

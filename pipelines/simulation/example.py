@@ -21,8 +21,8 @@ from pipelines.io import schema
 from pipelines.io.log import Array, Controller, ExperimentLog, Signal
 from pipelines.io.model_file import read_model
 from pipelines.io.robot import format_robot
-from pipelines.signal.fourier import FourierSeries
 from pipelines.simulation.config import EXAMPLE
+from pipelines.simulation.fourier_series import FourierSeries
 from pipelines.simulation.imitate import How, imitate
 
 __all__ = ["FAULT", "example_arm", "example_session"]

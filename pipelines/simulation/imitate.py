@@ -15,10 +15,10 @@ import numpy.typing as npt
 
 from pipelines.dynamics.arm import Arm
 from pipelines.errors import InputRejected, UsageError
+from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.io import schema
 from pipelines.io.log import Array, Derived, ExperimentLog, Signal, created, digest_of, recording
 from pipelines.io.results import NOT_STORED
-from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.simulation.closed_loop import Noise, Simulated, run
 from pipelines.simulation.config import SIMULATION
 from pipelines.simulation.course import Course, course

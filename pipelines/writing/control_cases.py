@@ -22,8 +22,8 @@ from pipelines.dynamics.draw import drawn
 from pipelines.dynamics.kinematics import serial_chain, tip_position
 from pipelines.effects.base import Hooks
 from pipelines.errors import InputRejected
+from pipelines.estimation.motion import Reconstructed
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.motion import Reconstructed
 from pipelines.simulation.closed_loop import run
 from pipelines.simulation.experiment import Experiment
 from pipelines.simulation.plant import Plant

@@ -20,14 +20,14 @@ import numpy.typing as npt
 from pipelines.dynamics.arm import Arm, ArmTorque
 from pipelines.dynamics.kinematics import serial_chain, tip_position
 from pipelines.errors import Check, RrridError
+from pipelines.estimation.filters import zero_phase
+from pipelines.estimation.motion import Reconstructed
 from pipelines.importers.units import ControllerTable
 from pipelines.io.log import Array, ExperimentLog, recording
 from pipelines.io.output import slug
 from pipelines.io.results import NOT_STORED
 from pipelines.io.schema import joint_unit
 from pipelines.model.estimation.conditioning import condition
-from pipelines.model.motion import Reconstructed
-from pipelines.signal.filters import zero_phase
 from pipelines.simulation.imitate import How, Imitation, imitate
 from pipelines.writing.config import CONFIG
 from pipelines.writing.control_cases import (

@@ -158,7 +158,7 @@ def test_changed_code_and_libraries(small: Path, monkeypatch: pytest.MonkeyPatch
     """P09: a module of one stage alone, and a library of all."""
     code = cache.code_of
     monkeypatch.setattr(cache, "code_of", lambda module, sources, *without: code(module, sources, *without) | (
-        {"pipelines.signal.smoother": "other"} if module == "pipelines.reconstruct" else {}))
+        {"pipelines.estimation.smoother": "other"} if module == "pipelines.reconstruct" else {}))
     planned = run.plan(Request((small / "logs",), out=small / "out"), SHORT)
     assert [(one.stage, one.why) for one in planned if one.computed] == [
         ("reconstruct", "code of signal.smoother"), ("frf", "reconstruct before it changed")]

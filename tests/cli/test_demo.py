@@ -18,8 +18,8 @@ import pytest
 from pipelines import demo
 from pipelines.diagnosis.result import Diagnosis, Finding, NotIdentifiable, Value
 from pipelines.errors import InputRejected
+from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.io.files import write_log
-from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.simulation.example import FAULT, example_arm, example_session
 from pipelines.stage import Request
 from tests.cli.commands import REPO, rrrid

@@ -15,10 +15,10 @@ from bench.faults import make
 from bench.machine import Machine
 from bench.motions import gravity_of
 from bench.plant import record
+from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.friction.joint import JointFit, JointLogs, fit_joint
 from pipelines.friction.laws import law_named
 from pipelines.io.log import Array
-from pipelines.model.motion import Reconstruction, reconstruct
 from tests.friction.one_joint import relative
 
 

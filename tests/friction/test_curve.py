@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.friction.ekf import filtered
 from pipelines.friction.fit import LawEquations, LawFit, fit_law
 from pipelines.friction.laws import OneJoint, law_named
 from pipelines.friction.refine import refined
 from pipelines.friction.weak_form import Stretch, stretches_of
-from pipelines.model.motion import Reconstruction, reconstruct
 from tests.friction.one_joint import (
     COSINE,
     ENCODER,

@@ -7,9 +7,9 @@ import cmath
 import numpy as np
 import pytest
 
+from benchmarks.textbook_kalman import ExtendedTextbook
 from pipelines.friction.ekf import EKF_NAMES, EkfStart, joint_step, run_ekf
-from pipelines.signal.extended import filter_extended
-from pipelines.signal.kalman import ExtendedTextbook
+from pipelines.friction.extended_filter import filter_extended
 from tests.friction.one_joint import COSINE, ENCODER, INERTIA, SINE, recorded
 
 TRUE = np.array([0.3, 0.8, 1.0 / INERTIA, SINE, 0.4, 1.2, -0.4, 120.0, 60.0, 12.0, 0.12, COSINE])

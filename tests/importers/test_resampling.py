@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipelines.signal.resample import grid, resample
+from pipelines.estimation.grids import grid, resample
 from tests.importers.good import recording
 
 

@@ -35,7 +35,7 @@ def test_every_field_is_told_in_words(what: str) -> None:
 def test_words_stand_beside_their_field() -> None:
     """A comment on the field's line or right above it, of the class itself or of the one it extends; units stand in it."""
     from pipelines.diagnosis.result import Result
-    from pipelines.model.motion_result import LogResult
+    from pipelines.estimation.motion_result import LogResult
 
     assert words_of(LogResult)["predicted"].startswith("predicted: samples in which the position of some joint was not measured")
     assert words_of(Result)["rated"].startswith("rated: [N m]")

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.estimation.mean_period import doubts, mean_period
+from pipelines.estimation.motion import Reconstruction, reconstruct
+from pipelines.estimation.periods import Periods
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.mean_period import doubts, mean_period
-from pipelines.model.motion import Reconstruction, reconstruct
-from pipelines.signal.periods import Periods
 from tests.healthy import with_signal
 from tests.model.estimation.experiments import motion_of, one_period, periodic
 from tests.seeds import rarely

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected, UsageError
+from pipelines.estimation.motion import METHODS, Reconstructed, Reconstruction, reconstruct
 from pipelines.io.log import Array, ExperimentLog, derive
-from pipelines.model.motion import METHODS, Reconstructed, Reconstruction, reconstruct
 from tests.fault_table import FAULTS
 from tests.healthy import (
     ENCODER,

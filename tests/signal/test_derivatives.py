@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.signal.derivatives import apply_kernel, half_width, kernel, local_polynomial
+from pipelines.estimation.filters import apply_kernel, half_width, kernel, local_polynomial
 
 
 @pytest.mark.parametrize("half", [3, 12, 60])
@@ -15,9 +15,9 @@ def test_polynomials_up_to_the_order_are_exact(half: int) -> None:
     t = np.arange(400) * ts
     p = np.polynomial.Polynomial([1e4, -2.0, 0.5, 0.3, -0.2])
     x = np.stack([p(t), -3.0 * p(t)], axis=-1)
-    smooth = local_polynomial(x, ts, half)
+    value, first, second = local_polynomial(x, ts, half)
     inner = slice(half, -half)
-    for found, exact, tolerance in ((smooth.value, p, 1e-9), (smooth.first, p.deriv(), 1e-8), (smooth.second, p.deriv(2), 1e-4)):
+    for found, exact, tolerance in ((value, p, 1e-9), (first, p.deriv(), 1e-8), (second, p.deriv(2), 1e-4)):
         np.testing.assert_allclose(found[:, 0], exact(t)[inner], atol=tolerance * (1 + 30 / half))
         np.testing.assert_allclose(found[:, 1], -3.0 * exact(t)[inner], atol=3 * tolerance * (1 + 30 / half))
 
@@ -52,6 +52,5 @@ def test_the_width_gives_the_cutoff(rate: float, cutoff: float) -> None:
 
 def test_noise_falls_as_the_weights_say() -> None:
     noise = np.random.default_rng(1).standard_normal((200_000, 1))
-    smooth = local_polynomial(noise, 1.0, 25)
-    for values, derivative in ((smooth.value, 0), (smooth.first, 1), (smooth.second, 2)):
+    for derivative, values in enumerate(local_polynomial(noise, 1.0, 25)):
         assert np.std(values) == pytest.approx(np.linalg.norm(kernel(25, 4, derivative)), rel=0.03)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.signal import butter, sosfiltfilt
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.signal.filters import (
+from pipelines.estimation.filters import (
     centre_hold,
     centre_samples,
     choose_decimation,

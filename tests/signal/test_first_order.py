@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
-from pipelines.signal.first_order import held_mean, lagging, rate_of_change
+from pipelines.dynamics.first_order import held_mean, lagging, rate_of_change
 
 
 def test_a_ramp_comes_late_by_the_time_constant() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.signal.fourier import (
+from pipelines.simulation.fourier_series import (
     FourierSeries,
     adjoint,
     degree_of,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.signal.grid import grids, lay_on, on_grid
-from pipelines.signal.observer import design
-from pipelines.signal.smoother import smooth
+from pipelines.estimation.grids import grids, lay_on, on_grid
+from pipelines.estimation.smoother import smooth
+from pipelines.estimation.state_estimation import design
 from tests.signal.chains import swing
 
 T = 1e-3

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.errors import InputRejected, UsageError
-from pipelines.signal.kalman import Textbook
+from benchmarks.textbook_kalman import Textbook
 from tests.signal.chains import exact_smoother, swing
 
 
@@ -32,14 +31,3 @@ def test_a_skipped_time_is_a_step_twice_as_long_for_a_chain_without_noise() -> N
     y = 0.3 + 2.0 * t - 4.0 * t**2
     track = Textbook(1e-3, 1e-12).smooth(t, y, np.array([y[0], 0.0, 0.0]), np.diag([1e-6, 1e2, 1e4]))
     np.testing.assert_allclose(track.states, np.stack([y, 2.0 - 8.0 * t, np.full(400, -8.0)], axis=1), rtol=0, atol=2e-4)
-
-
-def test_bad_input_is_refused() -> None:
-    """Time that does not increase, infinities, two channels at once, one sample."""
-    book, p = Textbook(1.0, 1.0), np.eye(3)
-    t, y = np.arange(4.0), np.zeros(4)
-    for bad_t, bad_y in ((t[::-1], y), (t, np.array([0, np.inf, 0, 0])), (t[:1], y[:1])):
-        with pytest.raises(InputRejected):
-            book.filter(bad_t, bad_y, np.zeros(3), p)
-    with pytest.raises(UsageError):
-        book.smooth(t, np.zeros((4, 2)), np.zeros(3), p)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
+from benchmarks.textbook_kalman import Textbook
 from pipelines.errors import InputRejected, UsageError
-from pipelines.signal.chain import held_input, stationary, transition
-from pipelines.signal.kalman import Textbook
-from pipelines.signal.observer import Start, design, observe
+from pipelines.estimation.chain import held_input, lyapunov, stationary, transition
+from pipelines.estimation.state_estimation import Start, design, observe
 from tests.seeds import rarely
 from tests.signal.chains import assert_near, exact_smoother, swing, with_gaps
 
@@ -58,7 +58,10 @@ def test_bandwidth_and_noise_of_the_verified_table() -> None:
     np.testing.assert_allclose(observer.bandwidth_hz, [31, 105, 207, 388], rtol=0.015)
     np.testing.assert_allclose(np.abs(observer.response(np.geomspace(1, 499, 4000))[:, :, 0]).max(axis=0),
                                [1.54, 1.44, 1.31, 1.16], rtol=0.005)
-    np.testing.assert_allclose(observer.noise_std[:, 2], [0.0022, 0.057, 0.38, 2.0], rtol=0.02)
+    f = observer.filter  # what passes of white noise R
+    spread = lyapunov(f.updater @ f.transition, f.gain[:, :, None] * f.gain[:, None, :])
+    noise_std = np.sqrt(np.einsum("njj->nj", spread)) * observer.unit
+    np.testing.assert_allclose(noise_std[:, 2], [0.0022, 0.057, 0.38, 2.0], rtol=0.02)
 
 
 @pytest.mark.parametrize("order", [2, *rarely(3), 4])

@@ -7,8 +7,8 @@ import pytest
 from scipy.signal import butter, lfilter, sosfreqz
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.signal.filters import passed_both_ways
-from pipelines.signal.periods import average_periods, mean_of_periods, passed_std
+from pipelines.estimation.filters import passed_both_ways
+from pipelines.estimation.periods import average_periods, mean_of_periods, passed_std
 from tests.seeds import rarely
 
 
@@ -28,26 +28,14 @@ def test_mean_and_noise_are_recovered(size: float) -> None:
     phase = 2 * np.pi * np.arange(round(size)) / round(size)
     truth = np.stack([np.sin(phase) + 0.3 * np.cos(int(size / 50) * phase), 2.0 + np.cos(2 * phase)], axis=1)
     assert found.count == 10
-    assert found.interpolated == (size != 500)
     np.testing.assert_allclose(np.sqrt(found.noise_variance), noise, rtol=0.05)
-    assert (np.std(found.mean - truth, axis=0) < 1.1 * found.std_of_mean).all()
-    assert np.abs(found.autocorrelation[2:]).max() < 0.1
+    assert (np.std(found.mean - truth, axis=0) < 1.1 * np.sqrt(found.noise_variance / 10)).all()
 
 
 def test_interpolated_periods_of_a_clean_signal_are_exact() -> None:
     """Without noise, a period of 500.37 samples leaves 1e-6 of the signal as scatter."""
     found = average_periods(periodic(5004, 500.37), 1000.0, 0.50037)
     assert np.sqrt(found.noise_variance).max() < 1e-6
-
-
-def test_coloured_noise_shows_in_the_autocorrelation() -> None:
-    """An AR(1) noise of coefficient 0.8 has autocorrelation 0.8^k."""
-    rng = np.random.default_rng(2)
-    e = rng.standard_normal(40_000)
-    for k in range(1, len(e)):
-        e[k] += 0.8 * e[k - 1]
-    found = average_periods(periodic(40_000, 1000)[:, :1] + e[:, None], 1000.0, 1.0, lags=10)
-    np.testing.assert_allclose(found.autocorrelation[:, 0], 0.8 ** np.arange(11), atol=0.04)
 
 
 def test_a_strange_period_is_left_out_and_named() -> None:

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 
-from pipelines.signal.prediction import prediction_errors, prediction_weights
+from pipelines.estimation.filters import prediction_errors, prediction_weights
 
 POWER = 0.3
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from benchmarks.textbook_kalman import Textbook
 from pipelines.errors import InputRejected
-from pipelines.signal.kalman import Textbook
-from pipelines.signal.observer import Start, design, observe
-from pipelines.signal.smoother import Smoother, smooth, twicing_growth
+from pipelines.estimation.smoother import smooth, smoothed_std, twicing_growth
+from pipelines.estimation.state_estimation import Start, design, observe
 from tests.seeds import rarely
 from tests.signal.chains import assert_near, exact_smoother, swing, walk, with_gaps
 
@@ -81,7 +81,7 @@ def test_time_reversed_data_give_time_reversed_states() -> None:
     y = swing(4000, 1, STEP)
     observer = design(T, 500.0, R)
     forward, backward = smooth(y, observer).states[:, 500:-500, 0], smooth(y[::-1].copy(), observer).states[:, 500:-500, 0]
-    std = Smoother(observer).std[:, 0]
+    std = smoothed_std(observer)[:, 0]
     assert np.sqrt(np.mean((forward[0] - backward[0, ::-1]) ** 2)) < 0.1 * std[0]
     assert np.sqrt(np.mean((forward[1] + backward[1, ::-1]) ** 2)) < 0.1 * std[1]
 

@@ -24,6 +24,9 @@ from operator import and_
 import numpy as np
 
 from pipelines.errors import InputRejected
+from pipelines.estimation.mean_period import alike
+from pipelines.estimation.motion import reconstruct
+from pipelines.estimation.observers import METHODS
 from pipelines.fit.bootstrap import apart
 from pipelines.model.estimation.blocks import Stretches
 from pipelines.model.estimation.logs import (
@@ -36,9 +39,6 @@ from pipelines.model.estimation.logs import (
     judge,
 )
 from pipelines.model.estimation.regression import Rows
-from pipelines.model.mean_period import alike
-from pipelines.model.motion import reconstruct
-from pipelines.model.tuned import METHODS
 
 __all__ = ["Compared", "compare"]
 

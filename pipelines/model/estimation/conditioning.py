@@ -8,8 +8,14 @@ from fractions import Fraction
 import numpy as np
 
 from pipelines.dynamics.body import Array, Motion
+from pipelines.estimation.filters import (
+    KEEP,
+    LowPass,
+    choose_decimation,
+    choose_step,
+    design_low_pass,
+)
 from pipelines.io.limits import GAP_TICKS
-from pipelines.signal.filters import KEEP, LowPass, choose_decimation, choose_step, design_low_pass
 
 __all__ = ["HIGHEST", "Conditioning", "condition", "cutoff_at", "wanted_cutoff"]
 

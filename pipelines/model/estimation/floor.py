@@ -16,14 +16,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import InputRejected
+from pipelines.estimation.mean_period import NoiseFloor, mean_period
+from pipelines.estimation.motion import Reconstructed, Reconstruction, noise_response
 from pipelines.fit.least_squares import errors
 from pipelines.fit.statistics import gather
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.estimation.conditioning import cutoff_at
 from pipelines.model.estimation.logs import Fitted, Judged, Motions, equations_of
 from pipelines.model.estimation.regression import LogEquations
-from pipelines.model.mean_period import NoiseFloor, mean_period
-from pipelines.model.motion import Reconstructed, Reconstruction, noise_response
 
 __all__ = ["Beside", "Scatter", "averaged", "residuals"]
 

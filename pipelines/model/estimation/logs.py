@@ -9,6 +9,8 @@ import numpy as np
 
 from pipelines.dynamics.body import Motion
 from pipelines.errors import InputRejected, UsageError
+from pipelines.estimation.filters import KEEP
+from pipelines.estimation.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.fit.least_squares import Errors
 from pipelines.fit.statistics import Triangles, gather
 from pipelines.io.log import Array, ExperimentLog
@@ -16,8 +18,6 @@ from pipelines.model.estimation.blocks import Stretches, by_blocks, by_stretches
 from pipelines.model.estimation.conditioning import condition, cutoff_at, wanted_cutoff
 from pipelines.model.estimation.estimate import Estimate, Stacked, estimate
 from pipelines.model.estimation.regression import Columns, LogEquations, Rows
-from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
-from pipelines.signal.filters import KEEP
 
 __all__ = ["FEWEST_OF_JOINT", "Fitted", "Judged", "Motions", "Recipe", "equations_of", "fit_logs", "judge", "motions_of",
            "none_left", "of_each", "refuse_too_few", "with_cutoff"]

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.dynamics.arm import Arm, ArmTorque
+from pipelines.estimation.filters import choose_decimation, design_low_pass, zero_phase
+from pipelines.estimation.motion import Reconstructed
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.model_file import Validity
 from pipelines.model.estimation.conditioning import cutoff_at
 from pipelines.model.estimation.logs import Fitted, Motions
 from pipelines.model.estimation.peaks import bridged
 from pipelines.model.estimation.regression import Columns
-from pipelines.model.motion import Reconstructed
-from pipelines.signal.filters import choose_decimation, design_low_pass, zero_phase
 
 __all__ = ["Course", "Direction", "Estimated", "course", "parameters", "torques", "validity"]
 

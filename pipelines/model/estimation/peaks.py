@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.dynamics.body import Array
+from pipelines.estimation.filters import LowPass, zero_phase
 from pipelines.quality.segments import Usable
-from pipelines.signal.filters import LowPass, zero_phase
 
 __all__ = ["bridged", "near_peaks"]
 

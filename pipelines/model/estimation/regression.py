@@ -21,12 +21,12 @@ import numpy.typing as npt
 from pipelines.dynamics.body import Array, Motion, RigidBody
 from pipelines.dynamics.rrr import ACTING, RRR
 from pipelines.effects.base import ArmModel, Effect
+from pipelines.estimation.filters import centre_hold, centre_samples, zero_phase
+from pipelines.estimation.motion import Reconstructed
 from pipelines.fit.contrasts import of_mean
 from pipelines.fit.equations import Block
 from pipelines.model.estimation.conditioning import Conditioning
 from pipelines.model.estimation.peaks import bridged, near_peaks
-from pipelines.model.motion import Reconstructed
-from pipelines.signal.filters import centre_hold, centre_samples, zero_phase
 
 __all__ = ["Column", "Columns", "LogEquations", "Rows"]
 

@@ -20,9 +20,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.dynamics.body import Array
+from pipelines.estimation.motion import Reconstructed
 from pipelines.model.estimation.logs import Motions, Recipe, equations_of, fit_logs
 from pipelines.model.estimation.regression import Columns, LogEquations, Rows
-from pipelines.model.motion import Reconstructed
 from pipelines.quality.segments import Mask
 
 __all__ = ["RestConfig", "rests", "without_stiction"]

@@ -31,11 +31,18 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.dynamics.body import Motion
+from pipelines.estimation.filters import (
+    AMPLE,
+    COARSE,
+    ample,
+    passed_both_ways,
+    prediction_errors,
+    prediction_weights,
+    thinned,
+)
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.estimation.logs import Motions, Recipe, equations_of
 from pipelines.model.estimation.regression import Columns, LogEquations, Rows
-from pipelines.signal.filters import AMPLE, COARSE, ample, fast_length, passed_both_ways, thinned
-from pipelines.signal.prediction import prediction_errors, prediction_weights
 
 __all__ = ["END", "PAD", "Data", "Kept", "LogData", "Run", "Whitening", "gather", "run_of"]
 
@@ -164,7 +171,9 @@ def run_of(equations: LogEquations, part: slice, skip: int = 1) -> Run:
     cutoff = how.cutoff_hz
     reach = min(2 if cutoff is None else int(np.ceil(END * rate / cutoff)), n // 4)
     pad = whole * (min(n - 2, 16 if cutoff is None else int(np.ceil(PAD * rate / cutoff))) // whole)
-    size = 2 * whole * fast_length(-(-(n + 2 * pad) // (2 * whole)))
+    from scipy.fft import next_fast_len
+
+    size = 2 * whole * int(next_fast_len(-(-(n + 2 * pad) // (2 * whole)), real=True))
     bins = np.arange(int(size / step) // 2 + 1)
     turn = 2.0 * np.pi * bins / size
     response = np.ones(len(bins)) if cutoff is None else passed_both_ways(bins * rate / size, cutoff, rate)

@@ -25,6 +25,9 @@ import numpy.typing as npt
 from pipelines.dynamics.arm import Arm
 from pipelines.effects.base import FrictionLaw
 from pipelines.errors import InputRejected
+from pipelines.estimation.motion import Reconstructed, reconstruct
+from pipelines.estimation.state_estimation import design
+from pipelines.estimation.tuning import smoother_bandwidth
 from pipelines.io.log import Array, ExperimentLog, recording
 from pipelines.model.estimation.conditioning import cutoff_at
 from pipelines.model.estimation.logs import (
@@ -41,12 +44,9 @@ from pipelines.model.estimation.logs import (
 from pipelines.model.estimation.nominal import nominal_columns, with_offsets
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.estimation.rests import RestConfig
-from pipelines.model.motion import Reconstructed, reconstruct
 from pipelines.model.rows.data import Data, gather
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.nominal import fit_nominal
-from pipelines.signal.observer import design
-from pipelines.signal.tuning import smoother_bandwidth
 
 __all__ = ["BLOCKS", "FewerTerms", "Logs", "Prepared", "prepare", "rests", "sharpened", "sticking"]
 

@@ -28,10 +28,11 @@ from pipelines.model.estimation.regression import Columns, LogEquations
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.nominal import fit_nominal
 from pipelines.model.rows.prepare import Prepared
-from pipelines.signal.neighbours import nearest_pairs
 
-__all__ = ["Repeated", "facts", "nominal_estimate"]
+__all__ = ["Repeated", "facts", "nearest_pairs", "nominal_estimate"]
 
+Indices = npt.NDArray[np.intp]
+_NEIGHBOURS = 32  # numerics: that are looked at; slow motion has many next to it in time
 _STILL = (1e-3, 1e-2, 0.1)  # [rad, rad/s, rad/s²; m, m/s, m/s²] less motion is noise
 _NEAR = 0.1  # of the standard deviation of each coordinate: rows of one state
 _APART = 1.0  # [s] in a log, at least: after less, what wanders is still where it was
@@ -120,3 +121,32 @@ def _noise(prepared: Prepared) -> Array:
 def _equations(data: Data, columns: Columns) -> list[LogEquations]:
     """Return the equations of each log in `columns`; rows may hold more terms of a friction law."""
     return [replace(log.equations, columns=columns) for log in data.logs]
+
+
+def nearest_pairs(state: Array, time: Array, near: float, apart: float) -> tuple[Indices, Indices]:
+    """Return pairs of rows of one state, the nearest first; no row is in two of them.
+
+    Args:
+        state: (rows, coordinates), each in units of what is no motion of it.
+        time: (rows,) [s]
+        near: of the standard deviation of each coordinate, by which two rows may differ, or by a unit.
+        apart: [s] between them, at least.
+    """
+    from scipy.spatial import cKDTree
+
+    if len(state) < 2:
+        return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
+    scaled = state / np.maximum(state.std(axis=0), 1.0 / near)
+    distance, other = cKDTree(scaled).query(
+        scaled, min(_NEIGHBOURS, len(scaled)), p=np.inf, distance_upper_bound=near
+    )
+    here, place = np.nonzero(np.isfinite(distance))
+    there = other[here, place]
+    kept = np.abs(time[here] - time[there]) >= apart
+    here, there, distance = here[kept], there[kept], distance[here, place][kept]
+    free, chosen = np.ones(len(scaled), dtype=bool), []
+    for k in np.argsort(distance, kind="stable"):
+        if free[here[k]] and free[there[k]]:
+            free[[here[k], there[k]]] = False
+            chosen.append(k)
+    return here[chosen], there[chosen]

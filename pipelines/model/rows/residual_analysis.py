@@ -20,10 +20,10 @@ from typing import Literal
 
 import numpy as np
 
+from pipelines.estimation.filters import welch
 from pipelines.io.log import Array
 from pipelines.model.rows.data import Data, LogData
 from pipelines.model.rows.fit import Refined
-from pipelines.signal.spectra import welch
 from pipelines.simulation.comparison import Simulation
 
 __all__ = ["Curve", "Evidence", "Proof", "Spectrum", "amplitudes", "binned", "evidence", "least_order", "proof",
@@ -270,9 +270,8 @@ def _over_frequency(one: LogData, x: Array) -> tuple[Array, Array] | None:
     if len(x) < 64:
         return None
     step = float(np.median(np.diff(one.t)))
-    found = welch(x[:, None], 1.0 / step, min(_SEGMENT, len(x) // 2))
-    width = float(found.frequency[1] - found.frequency[0])
-    return found.frequency, np.sqrt(found.density[:, 0] * width)
+    frequency, density = welch(x[:, None], 1.0 / step, min(_SEGMENT, len(x) // 2))
+    return frequency, np.sqrt(density[:, 0] * (frequency[1] - frequency[0]))
 
 
 def _bands(spectra: list[Spectrum], joints: int) -> Array:

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.estimation.observers import Reconstruction
 from pipelines.io.log import ExperimentLog
 from pipelines.model.estimation.balance import ALONE, Balance, power_balance
 from pipelines.model.estimation.logs import Recipe, fit_logs, motions_of
 from pipelines.model.estimation.nominal import nominal_columns
-from pipelines.model.tuned import Reconstruction
 from tests.healthy import with_signal
 from tests.model.estimation.experiments import experiment, truth
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy import signal
 
+from pipelines.estimation.motion import reconstruct
+from pipelines.estimation.observers import Reconstruction
 from pipelines.model.estimation.outcome import course, torques
-from pipelines.model.motion import reconstruct
-from pipelines.model.tuned import Reconstruction
 from tests.healthy import with_signal
 from tests.model.estimation.experiments import arm, experiment
 

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.estimation.mean_period import mean_period
+from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.fit.contrasts import Cycle
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.estimation.cycle import cycle_of
 from pipelines.model.estimation.logs import Recipe, equations_of
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import LogEquations
-from pipelines.model.mean_period import mean_period
-from pipelines.model.motion import Reconstruction, reconstruct
 from tests.healthy import with_signal
 from tests.model.estimation.experiments import arm, motion_of, periodic
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.model.motion import reconstruct
-from pipelines.model.tuned import Reconstruction
+from pipelines.estimation.motion import reconstruct
+from pipelines.estimation.observers import Reconstruction
 from tests.healthy import ENCODER, good_log, make_log, rest, with_signal
 from tests.model.estimation.experiments import motion_of
 

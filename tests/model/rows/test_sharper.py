@@ -12,12 +12,12 @@ from bench.draw import draw_machine
 from bench.experiments import excitation
 from bench.machine import Machine
 from bench.plant import Recording, as_log, run
+from pipelines.estimation.motion import Reconstruction
+from pipelines.estimation.tuning import smoother_bandwidth
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.estimation.conditioning import wanted_cutoff
 from pipelines.model.estimation.logs import Motions, Recipe, motions_of
-from pipelines.model.motion import Reconstruction
 from pipelines.model.rows.prepare import sharpened
-from pipelines.signal.tuning import smoother_bandwidth
 
 HOW = Reconstruction()
 _ENDS = 100  # samples

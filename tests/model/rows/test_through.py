@@ -12,6 +12,7 @@ from pipelines.diagnosis.engine import pose
 from pipelines.diagnosis.screening import best_of
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Motion
+from pipelines.dynamics.first_order import lagging
 from pipelines.effects.angle import Cogging
 from pipelines.effects.base import Effect
 from pipelines.effects.drives import DriveLag, LoadFriction, TorqueLag
@@ -23,7 +24,6 @@ from pipelines.model.rows.exact import Exact, nominal_slopes, slopes_of
 from pipelines.model.rows.fit import refine
 from pipelines.model.rows.nominal import fit_nominal, rigid_rows
 from pipelines.model.rows.prepare import Logs, prepare
-from pipelines.signal.first_order import lagging
 from tests.diagnose.sessions import but
 from tests.diagnosis.asking import diagnosed, effects
 from tests.diagnosis.rotor import INERTIA, LAG, ORDER, ROTOR, turned

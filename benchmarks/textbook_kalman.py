@@ -1,7 +1,7 @@
-"""The textbook Kalman filter, sample by sample: the reference for the fast one, and the path for uneven sampling.
+"""Run filterpy's Kalman filters sample by sample: the reference for the fast ones.
 
-The only door to filterpy (Labbe, "Kalman and Bayesian Filters in Python"). One channel at a time; a missing sample is passed
-as None, because a NaN would poison every later state without a word.
+Labbe, "Kalman and Bayesian Filters in Python". One channel at a time; a missing sample is passed as
+None, because a NaN would poison every later state.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.errors import InputRejected, UsageError
-from pipelines.signal.chain import held_input, transition
+from pipelines.estimation.chain import held_input, transition
 
 __all__ = ["ExtendedTextbook", "Reference", "Textbook"]
 
@@ -32,40 +31,30 @@ class Reference:
 
 @dataclass(frozen=True)
 class Textbook:
-    """A chain of integrators, Kostić et al. 2004, eq. (18)-(19), run by filterpy in the order update, predict."""
+    """A chain of integrators, Kostić et al. 2004, eq. (18)-(19), in the order update, predict."""
 
     jerk_std: float  # σ [unit / s^order]
     noise_variance: float  # R [unit²]
     order: int = 3
 
     def filter(self, t: Array, y: Array, mean: Array, covariance: Array) -> Reference:
-        """Updated states of one channel `y` (samples,), NaN where missing, at increasing times `t` [s]."""
-        self._check(t, y)
+        """Return the updated states of one channel `y` (samples,), NaN where missing."""
         means, covariances = self._batch(t, y, mean, covariance)[1]
         return Reference(means, covariances)
 
     def smooth(self, t: Array, y: Array, mean: Array, covariance: Array) -> Reference:
-        """Rauch-Tung-Striebel smoother over all samples; same arguments as `filter`."""
-        self._check(t, y)
+        """Return those of the Rauch-Tung-Striebel smoother over all samples."""
         kalman, (means, covariances), (f, q) = self._batch(t, y, mean, covariance)
-        # filterpy's smoother takes the step from k to k+1 from entry k+1, its filter takes it from entry k
-        states, spread, _, _ = kalman.rts_smoother(means, covariances, Fs=[f[0], *f[:-1]], Qs=[q[0], *q[:-1]])
+        # filterpy's smoother takes the step from k to k+1 from entry k+1, its filter from entry k
+        states, spread, _, _ = kalman.rts_smoother(
+            means, covariances, Fs=[f[0], *f[:-1]], Qs=[q[0], *q[:-1]]
+        )
         return Reference(states, spread)
 
-    def _check(self, t: Array, y: Array) -> None:
-        if len(t) != len(y) or y.ndim != 1:
-            raise UsageError("C02", f"one channel at a time: {t.shape} times, measurement of shape {y.shape}",
-                             remedy="give one column at a time")
-        if len(y) < 2:
-            raise InputRejected("T08", f"{len(y)} samples: nothing can be reconstructed", remedy="record at least two samples")
-        if not (np.isfinite(t).all() and np.all(np.diff(t) > 0.0)):
-            raise InputRejected("T01", "time does not increase", remedy="split the log at the step of its clock")
-        if np.isinf(y).any():
-            raise InputRejected("D03", "infinite values among the measurements", remedy="mark what is missing as NaN")
-
-    def _batch(self, t: Array, y: Array, mean: Array,
-               covariance: Array) -> tuple[Any, tuple[Array, Array], tuple[list[Array], list[Array]]]:
-        """The filter, its updated means and covariances, and E and Q of every step."""
+    def _batch(
+        self, t: Array, y: Array, mean: Array, covariance: Array
+    ) -> tuple[Any, tuple[Array, Array], tuple[list[Array], list[Array]]]:
+        """Return the filter, its updated means and covariances, and E and Q of every step."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # filterpy imports parts of SciPy that are going away
             from filterpy.kalman import KalmanFilter
@@ -74,7 +63,10 @@ class Textbook:
         f, q = list(transition(self.order, step)), list(reach[:, :, None] * reach[:, None, :])
         kalman = KalmanFilter(dim_x=self.order, dim_z=1)
         kalman.H, kalman.R = np.eye(self.order)[:1], np.array([[self.noise_variance]])
-        kalman.x, kalman.P = np.array(mean, dtype=np.float64), np.array(covariance, dtype=np.float64)
+        kalman.x, kalman.P = (
+            np.array(mean, dtype=np.float64),
+            np.array(covariance, dtype=np.float64),
+        )
         seen = [value if np.isfinite(value) else None for value in y.tolist()]
         means, covariances, _, _ = kalman.batch_filter(seen, Fs=f, Qs=q, update_first=True)
         return kalman, (means, covariances), (f, q)
@@ -82,14 +74,17 @@ class Textbook:
 
 @dataclass(frozen=True)
 class ExtendedTextbook:
-    """filterpy's extended filter of which the first state is measured; `advance` as in `pipelines.signal.extended`."""
+    """filterpy's extended filter of which the first state is measured.
+
+    `advance` as in `pipelines.friction.extended_filter`.
+    """
 
     advance: Callable[[Array, float], tuple[Array, Array]]
     process: Array  # (n, n) covariance that every step adds
     noise_variance: float
 
     def filter(self, y: Array, u: Array, mean: Array, covariance: Array) -> Reference:
-        """Updated states of `y` (samples,), NaN where missing, under the input `u` (samples,)."""
+        """Return the updated states of `y` (samples,), NaN where missing, under the input `u`."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             from filterpy.kalman import ExtendedKalmanFilter
@@ -102,11 +97,14 @@ class ExtendedTextbook:
 
             def predict_x(self, u: Any = 0) -> None:
                 ahead, moving = advance(self.x[:, 0], float(u))
-                self.F[:len(moving)] = moving
+                self.F[: len(moving)] = moving
                 self.x = ahead[:, None]
 
         kalman = Moving(dim_x=n, dim_z=1)
-        kalman.x, kalman.P = np.array(mean, dtype=np.float64)[:, None], np.array(covariance, dtype=np.float64)
+        kalman.x, kalman.P = (
+            np.array(mean, dtype=np.float64)[:, None],
+            np.array(covariance, dtype=np.float64),
+        )
         kalman.Q, kalman.R = self.process, np.array([[self.noise_variance]])
         kalman.F = np.eye(n)
         seen = np.eye(n)[:1]

@@ -1,12 +1,13 @@
-"""Finite Fourier series as motions: exact derivatives, their adjoint, and bounds that hold between samples too.
+"""Describe motions as finite Fourier series: exact derivatives, their adjoint, and bounds.
 
 Kostić et al. 2004, eq. (22), with w_j = 2π j Δf and the index that the print lacks (erratum E14):
 
     q = q0 + Σ (a_j sin w_j t - b_j cos w_j t)/w_j
     q̇ = Σ (a_j cos w_j t + b_j sin w_j t),    q̈ = Σ w_j (b_j cos w_j t - a_j sin w_j t)
 
-All channels share one period. A channel with a fundamental of its own has amplitudes at multiples of it alone; the others
-are zero. On M samples of a period everything is one real Fourier transform.
+All channels share one period. A channel with a fundamental of its own has amplitudes at multiples
+of it alone; the others are zero. The bounds hold between samples too. On M samples of a period
+everything is one real Fourier transform.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ __all__ = ["FourierSeries", "adjoint", "degree_of", "good_size", "periodic_peak"
 
 Array = npt.NDArray[np.float64]
 
-_NEGLIGIBLE = 1e-9  # of the largest sample: what the amplitudes beyond a degree may add up to
+_NEGLIGIBLE = (
+    1e-9  # numerics: of the largest sample: what the amplitudes beyond a degree may add up to
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +62,7 @@ class FourierSeries:
 
 
 def good_size(least: int) -> int:
-    """The smallest 2^i 3^j 5^k that is at least `least`: a fast length of a Fourier transform."""
+    """Return the smallest 2^i 3^j 5^k from `least` on: a fast length of a Fourier transform."""
     best = 1 << max(1, (least - 1).bit_length())
     five = 1
     while five < best:
@@ -73,21 +76,23 @@ def good_size(least: int) -> int:
 
 
 def synthesise(offset: Array, cosine: Array, sine: Array, omega: Array, count: int) -> Array:
-    """q, dq, ddq (3, channels, count) of eq. (22) at `count` samples of one period; count > 2 · harmonics."""
+    """Return q, dq, ddq (3, channels, count) of eq. (22) at `count` > 2 · harmonics samples."""
     channels, harmonics = cosine.shape
     spectrum = np.zeros((3, channels, count // 2 + 1), dtype=np.complex128)
-    speed = spectrum[1, :, 1:harmonics + 1]  # q̇ = Re Σ (a - i b) exp(i w t)
+    speed = spectrum[1, :, 1 : harmonics + 1]  # q̇ = Re Σ (a - i b) exp(i w t)
     speed.real, speed.imag = 0.5 * count * cosine, -0.5 * count * sine
     jw = 1j * omega
     spectrum[0, :, 0] = count * offset
-    np.divide(speed, jw, out=spectrum[0, :, 1:harmonics + 1])
-    np.multiply(speed, jw, out=spectrum[2, :, 1:harmonics + 1])
+    np.divide(speed, jw, out=spectrum[0, :, 1 : harmonics + 1])
+    np.multiply(speed, jw, out=spectrum[2, :, 1 : harmonics + 1])
     return np.asarray(np.fft.irfft(spectrum, count, axis=2))
 
 
 def adjoint(bars: Array, omega: Array) -> tuple[Array, Array, Array]:
-    """The transpose of `synthesise`: derivatives (3, channels, count) by q, dq, ddq to those by offset, cosine and sine."""
-    spectrum = np.fft.rfft(bars, axis=2)[:, :, :len(omega) + 1]
+    """Return the transpose of `synthesise`: derivatives by q, dq, ddq (3, channels, count) as those
+    by offset, cosine and sine.
+    """
+    spectrum = np.fft.rfft(bars, axis=2)[:, :, : len(omega) + 1]
     c, s = spectrum[:, :, 1:].real, -spectrum[:, :, 1:].imag  # Σ x cos w t and Σ x sin w t
     cosine = c[1] + s[0] / omega - s[2] * omega
     sine = s[1] - c[0] / omega + c[2] * omega
@@ -97,9 +102,10 @@ def adjoint(bars: Array, omega: Array) -> tuple[Array, Array, Array]:
 def periodic_peak(samples: Array) -> tuple[Array, Array]:
     """Bounds (lowest, highest) of periodic signals between their samples (…, count) as well.
 
-    A trigonometric polynomial of degree K stays, between M equal samples, within 1/cos(πK/M) of its largest one (Ehlich &
-    Zeller 1964). A signal that is none has a degree beyond which its amplitudes add up to next to nothing; they are added.
-    The middle of the signal is left out of the factor: a bound is as near as the swing allows.
+    A trigonometric polynomial of degree K stays, between M equal samples, within 1/cos(πK/M) of its
+    largest one (Ehlich & Zeller 1964). A signal that is none has a degree beyond which its
+    amplitudes add up to next to nothing; they are added. The middle of the signal is left out of
+    the factor: a bound is as near as the swing allows.
     """
     count = samples.shape[-1]
     low, high = samples.min(axis=-1), samples.max(axis=-1)
@@ -114,7 +120,8 @@ def degree_of(samples: Array) -> tuple[Array, Array]:
     count = samples.shape[-1]
     amplitudes = 2.0 / count * np.abs(np.fft.rfft(samples, axis=-1))
     beyond = np.cumsum(amplitudes[..., ::-1], axis=-1)[..., ::-1]
-    beyond = np.concatenate([beyond[..., 1:], np.zeros_like(beyond[..., :1])], axis=-1)  # of all degrees above each
+    # of all degrees above each
+    beyond = np.concatenate([beyond[..., 1:], np.zeros_like(beyond[..., :1])], axis=-1)
     limit = _NEGLIGIBLE * np.maximum(np.abs(samples).max(axis=-1, keepdims=True), 1e-300)
     degree = np.argmax(beyond <= limit, axis=-1)
     return degree.astype(np.float64), np.take_along_axis(beyond, degree[..., None], axis=-1)[..., 0]

@@ -1,10 +1,10 @@
 """A first-order lag, T dy/dt = x - y, exact for what x does between the samples.
 
-    lagging(x, t, T)        x goes straight from sample to sample
-    held_mean(u, h, T)      u is held over each sample; y is averaged over it
-    rate_of_change(x, t)    dx/dt by differences, not across gaps
-    continuous(T, h)        the lag of a filter that is computed once a sample, and how much sooner it acts
-    later(x, t, by)         x a little later
+lagging(x, t, T)        x goes straight from sample to sample
+held_mean(u, h, T)      u is held over each sample; y is averaged over it
+rate_of_change(x, t)    dx/dt by differences, not across gaps
+continuous(T, h)        the lag of a filter computed once a sample, and how much sooner it acts
+later(x, t, by)         x a little later
 """
 
 from __future__ import annotations
@@ -15,35 +15,44 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.signal.blocks import scan
-
 __all__ = ["continuous", "held_mean", "lagging", "later", "rate_of_change"]
 
 Array = npt.NDArray[np.float64]
 
-_GAP = 1.5  # sample times
-_MANY = 500.0  # time constants in a sample: no lag is left
+_NOTHING = 1e-22  # numerics: a start that has died out
+_GAP = 1.5  # numerics: sample times
+_MANY = 500.0  # numerics: time constants in a sample: no lag is left
 
 
 def lagging(
-    x: Array, t: Array, time_constant: float, start: Array | float | None = None, since: int = 0, digital: bool = False
+    x: Array,
+    t: Array,
+    time_constant: float,
+    start: Array | float | None = None,
+    since: int = 0,
+    digital: bool = False,
 ) -> Array:
-    """y (…, samples) of x (…, samples), settled at the start and behind every gap of t [s]; or `start` up to sample `since`.
+    """Return y (…, samples) of x, settled at the start and behind every gap of t [s].
 
-        y_{k+1} = a y_k + (m - a) x_k + (1 - m) x_{k+1},   a = exp(-h/T),   m = (1 - a) T/h,   m = a of a digital filter
+        y_{k+1} = a y_k + (m - a) x_k + (1 - m) x_{k+1},   a = exp(-h/T),   m = (1 - a) T/h
+
+    Args:
+        start: of y up to sample `since`, instead of a settled one.
+        digital: m = a.
     """
-    if time_constant <= 0.0 or len(t) < 2:
+    if time_constant <= 0.0 or len(t) <= 1:
         return np.array(x, dtype=np.float64)
     y = np.empty(x.shape)
     for part, h in _stretches(t):
         own = np.array(x[..., part].reshape(-1, part.stop - part.start), dtype=np.float64)
         a, m = _decay(h, time_constant)
         m = a if digital else m
-        drive = np.concatenate([own[:, :1], (m - a) * own[:, :-1] + (1.0 - m) * own[:, 1:]], axis=1)
+        moved = (m - a) * own[:, :-1] + (1.0 - m) * own[:, 1:]
+        drive = np.concatenate([own[:, :1], moved], axis=1)
         first = since if start is not None and part.start == 0 and since < own.shape[1] else 0
         if start is not None and part.start == 0:
             drive[:, first], own[:, :first] = start, start
-        own[:, first:] = scan(np.full((1, 1, 1), a), drive[:, first:, None].copy())[:, :, 0]
+        own[:, first:] = _recursion(a, drive[:, first:])
         y[..., part] = own.reshape(x[..., part].shape)
     return y
 
@@ -54,14 +63,15 @@ def held_mean(u: Array, h: float, time_constant: float) -> Array:
         return np.array(u, dtype=np.float64)
     a, m = _decay(h, time_constant)
     flat = u.reshape(len(u), -1)
-    before = np.stack([_recursion(a, 0.0, (1.0 - a) * column[:-1]) for column in flat.T], axis=1).reshape(u.shape)
+    drive = np.concatenate([np.zeros((flat.shape[1], 1)), (1.0 - a) * flat[:-1].T], axis=1)
+    before = _recursion(a, drive).T.reshape(u.shape)
     return np.asarray(u + m * (before - u))
 
 
 def rate_of_change(x: Array, t: Array) -> Array:
-    """dx/dt (samples,) by central differences, one-sided at the ends and on either side of a gap; zero of one sample alone."""
+    """Return dx/dt (samples,) by central differences, one-sided at ends and gaps."""
     out = np.zeros(len(x))
-    if len(x) < 2:
+    if len(x) <= 1:
         return out
     for part, _ in _stretches(t):
         if part.stop - part.start > 1:
@@ -70,9 +80,9 @@ def rate_of_change(x: Array, t: Array) -> Array:
 
 
 def continuous(time_constant: float, h: float) -> tuple[float, float]:
-    """Return a continuous lag [s] and the time [s] by which a digital one of T acts sooner: half a sample h.
+    """Return a continuous lag [s] and by how much [s] a digital one of T acts sooner: half of h.
 
-        h / (e^(h/T) - 1) + h/2 = T (1 + (h/T)²/12 - …)
+    h / (e^(h/T) - 1) + h/2 = T (1 + (h/T)²/12 - …)
     """
     if h <= 0.0 or time_constant * _MANY <= h:
         return time_constant * float(h <= 0.0), 0.0
@@ -93,9 +103,13 @@ def _decay(h: float, time_constant: float) -> tuple[float, float]:
     return float(np.exp(-ratio)), float(-np.expm1(-ratio) / ratio)
 
 
-def _recursion(a: float, start: float, drive: Array) -> Array:
-    """y_0 = start, y_{k+1} = a y_k + drive_k."""
-    return scan(np.full((1, 1, 1), a), np.concatenate([[start], drive])[None, :, None])[0, :, 0]
+def _recursion(a: float, drive: Array) -> Array:
+    """y_0 = d_0, y_{k+1} = a y_k + d_{k+1} of `drive` (channels, samples), by doubling."""
+    y, shift = np.array(drive), 1
+    while shift < y.shape[1] and a > _NOTHING:
+        y[:, shift:] += a * y[:, :-shift]
+        a, shift = a * a, 2 * shift
+    return y
 
 
 def _stretches(t: Array) -> Iterator[tuple[slice, float]]:

@@ -1,11 +1,12 @@
-"""An extended Kalman filter of which only a few states move and one is measured: the others are constants to be found.
+"""Run an extended Kalman filter of which a few states move and one is measured.
 
     run = filter_extended(advance, y, u, mean, covariance, noise)        one pass over all samples
 
-`advance(x, u)` gives the next states and the rows of ∂x'/∂x that belong to the moving ones, which come first; the rest of that
-matrix is the identity. So the covariance costs a few rows a step instead of two full products, and the update is of rank
-one: a step of eleven states takes about a quarter of the textbook's time (`pipelines.signal.kalman`, Labbe's filterpy), to
-which it is equal step by step. Missing samples are predicted through.
+The other states are constants that are estimated. `advance(x, u)` gives the next states and the
+rows of ∂x'/∂x that belong to the moving ones, which come first; the rest of that matrix is the
+identity. So the covariance costs a few rows a step instead of two full products, and the update is
+of rank one: a step of eleven states takes about a quarter of the textbook's time (filterpy of
+Labbe), to which it is equal step by step. Missing samples are predicted through.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ import numpy.typing as npt
 __all__ = ["Advance", "Extended", "filter_extended"]
 
 Array = npt.NDArray[np.float64]
-Advance = Callable[[Array, float], tuple[Array, Array]]  # states (n,), input -> next states (n,), Jacobian's moving rows (m, n)
+# states (n,), input -> next states (n,), Jacobian's moving rows (m, n)
+Advance = Callable[[Array, float], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +37,15 @@ class Extended:
         return np.asarray(self.states[-1])
 
 
-def filter_extended(advance: Advance, y: Array, u: Array, mean: Array, covariance: Array, process: Array,
-                    noise_variance: float) -> Extended:
+def filter_extended(
+    advance: Advance,
+    y: Array,
+    u: Array,
+    mean: Array,
+    covariance: Array,
+    process: Array,
+    noise_variance: float,
+) -> Extended:
     """Update with y_k, then predict with u_k, for every sample; the first state is measured.
 
     Args:

@@ -1,0 +1,262 @@
+"""Assess the reconstructed motion of a log: its observer, its residual, its uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pipelines.estimation.config import ResultConfig
+from pipelines.estimation.filters import welch
+from pipelines.estimation.grids import Measured, lay_on, measured
+from pipelines.estimation.mean_period import NoiseFloor, mean_period
+from pipelines.estimation.motion import Reconstructed
+from pipelines.estimation.observers import Reconstruction, encoder_resolution, tuned_observers
+from pipelines.estimation.state_estimation import Observer
+from pipelines.estimation.tuning import innovations, paper_rule, smoother_bandwidth, whiteness
+from pipelines.io.log import Array, ExperimentLog
+from pipelines.io.results import NOT_STORED
+from pipelines.io.schema import joint_unit
+from pipelines.model.estimation.conditioning import cutoff_at, wanted_cutoff
+
+_CONFIG = ResultConfig()
+
+
+@dataclass(frozen=True)
+class ObserverResult:
+    """The Kalman observer of Kostić et al. 2004, eq. (18)-(20). Every array is per joint."""
+
+    order: int
+    sample_time: float  # [s]
+    gains: Array  # (joints, order) k_i of Kostić et al. 2004, eq. (20) [1, 1/s, 1/s², ...]
+    bandwidth_hz: Array  # -3 dB of the position
+    measurement_std: Array  # [rad] √R
+    jerk_std: Array  # [rad/s^order] σ, as tuned or as given
+    jerk_std_paper: Array  # first guess of Kostić et al. 2004: the largest jerk of the reference
+
+
+@dataclass(frozen=True)
+class SmootherResult:
+    """The smoother between the ends of a log: zero phase, and less jerk than an observer needs."""
+
+    jerk_std: Array  # [rad/s^order] (joints,)
+    measurement_std: Array  # [rad]
+    bandwidth_hz: Array  # -3 dB of the position
+
+
+@dataclass(frozen=True)
+class Series:
+    """Series of the figures: lowest and highest sample of each short stretch (points, joints)."""
+
+    t: Array  # [s] (points,)
+    error: Array  # [rad] measured minus reconstructed; NaN where nothing was measured
+    speed: Array
+    speed_std: Array  # largest of the stretch
+    acceleration: Array
+    acceleration_std: Array
+    frequency: Array  # [Hz] (bins,)
+    error_density: Array  # [rad²/Hz] (bins, joints)
+
+
+@dataclass(frozen=True)
+class MeanResult:
+    """How well the mean period is known; an estimate takes its equations from it. Per joint."""
+
+    periods: int  # averaged
+    position_std: Array  # in the middle of all samples
+    speed_std: Array
+    acceleration_std: Array
+
+
+@dataclass(frozen=True)
+class LogResult:
+    """One log. Every array is per joint, in SI units (m for prismatic joints)."""
+
+    name: str
+    source: str
+    file: str  # the derived log, relative to the output folder
+    method: str
+    samples: int
+    predicted: int  # samples in which the position of some joint was not measured, and is predicted
+    units: tuple[str, ...]  # of position
+    resolution: Array  # [rad] of the encoders: described, or seen in the samples
+    observer: ObserverResult
+    smoother: SmootherResult | None
+    innovation_whiteness: Array  # standard normal where white; null for a joint that stands still
+    innovation_correlation: Array  # rms of their autocorrelation over 30 lags
+    innovation_verdict: tuple[str, ...]  # what that means
+    reconstruction_error_max: Array  # [rad] max |measured - reconstructed|
+    reconstruction_error_rms: Array  # [rad]
+    peak_speed: Array
+    peak_acceleration: Array
+    position_std: Array  # of the reconstruction, in the middle of all samples
+    speed_std: Array
+    acceleration_std: Array
+    noise_floor: NoiseFloor | None  # between the periods of a periodic log
+    mean: MeanResult | None  # of its periods, where they are averaged
+    series: Series | None
+    log: ExperimentLog = field(metadata=NOT_STORED, repr=False)
+
+    @property
+    def alarm(self) -> Array:
+        """[rad] (joints,) by which a reconstructed position may differ from a measured one.
+
+        The paper's limit, or one step of the encoder: what a coarse encoder counts is up to half a
+        step from the motion, and further where its count is late.
+        """
+        return np.maximum(_CONFIG.alarm, self.resolution)
+
+    @property
+    def straying(self) -> tuple[int, ...]:
+        """Revolute joints, from 1, whose reconstruction is further than `alarm` from measured."""
+        far = self.reconstruction_error_max > self.alarm
+        return tuple(j for j, unit in enumerate(self.units, 1) if unit == "rad" and far[j - 1])
+
+    @property
+    def coloured(self) -> tuple[int, ...]:
+        """Joints, from 1, with innovations so coloured that no stated deviation holds."""
+        verdicts = enumerate(self.innovation_verdict, 1)
+        return tuple(j for j, words in verdicts if words.startswith("coloured"))
+
+
+def assess(
+    log: ExperimentLog,
+    found: Reconstructed,
+    how: Reconstruction,
+    names: tuple[str, str],
+    derived: ExperimentLog,
+    draw: bool,
+) -> LogResult:
+    """Return all about the motion `found` of `log`; the series for figures if `draw`.
+
+    Args:
+        names: of the file that was read, and of the one that is written, without its ending.
+    """
+    seen, kept, runs = measured(log, found.good), found.good.kept, found.good.runs
+    tuned = found.observers or tuned_observers(seen, how)
+    inside = np.concatenate([np.arange(run.start, run.stop) for run in runs])
+    longest = max(runs, key=lambda run: run.stop - run.start)
+    error = np.full_like(seen.y, np.nan)  # Fig. 10(a)
+    error[inside] = seen.y[inside] - found.motion.q[kept][inside]
+    moved = kept[inside]
+    white, correlation = _whiteness(seen, tuned.causal)
+    verdict = tuple(map(_verdict, white.tolist(), correlation.tolist()))
+    reference = found.motion.q[kept]
+    if "q_ref" in found.good.log and np.isfinite(found.good.log["q_ref"][longest]).all():
+        reference = found.good.log["q_ref"]
+    smoothing = tuned.smoothing
+    floor, mean = _periods(log, seen, found, how)
+    return LogResult(
+        log.name,
+        names[0],
+        names[1],
+        how.method,
+        log.n_samples,
+        int(np.isnan(seen.y).any(axis=1).sum()),
+        tuple(joint_unit("q", joint.revolute) for joint in log.robot.joints),
+        encoder_resolution(found.good),
+        _observer(tuned.causal, paper_rule(reference[longest], seen.step, how.order)),
+        SmootherResult(
+            smoothing.jerk_std,
+            np.sqrt(smoothing.noise_variance),
+            smoother_bandwidth(smoothing, tuned.twice),
+        )
+        if how.method == "smoother"
+        else None,
+        white,
+        correlation,
+        verdict,
+        np.nanmax(np.abs(error), axis=0),
+        np.sqrt(np.nanmean(error**2, axis=0)),
+        np.abs(found.motion.dq[moved]).max(axis=0),
+        np.abs(found.motion.ddq[moved]).max(axis=0),
+        *_typical_std(found),
+        floor,
+        mean,
+        _series(seen, found, error, longest) if draw else None,
+        derived,
+    )
+
+
+def _observer(observer: Observer, paper: Array) -> ObserverResult:
+    return ObserverResult(
+        observer.order,
+        observer.sample_time,
+        observer.gain,
+        observer.bandwidth_hz,
+        np.sqrt(observer.noise_variance),
+        observer.jerk_std,
+        paper,
+    )
+
+
+def _typical_std(found: Reconstructed) -> tuple[Array, Array, Array]:
+    """Return the median deviation of position, speed and acceleration; NaN where there is none."""
+    none = (np.full_like(found.motion.q, np.nan),) * 3
+    q, dq, ddq = (np.median(std, axis=0) for std in found.std or none)
+    return q, dq, ddq
+
+
+def _periods(
+    log: ExperimentLog, seen: Measured, found: Reconstructed, how: Reconstruction
+) -> tuple[NoiseFloor | None, MeanResult | None]:
+    """Return what differs between periods, with the low-pass of an estimate, and their mean."""
+    rate = 1.0 / seen.step
+    floor, mean = mean_period(log, found, cutoff_at(wanted_cutoff(found.motion, rate), rate))
+    if floor is None or mean is None or not how.average:
+        return floor, None
+    return floor, MeanResult(floor.periods, *_typical_std(mean[1]))
+
+
+def _whiteness(seen: Measured, observer: Observer) -> tuple[Array, Array]:
+    """Return the whiteness of the innovations and the rms of their autocorrelation; (joints,) each.
+
+    NaN for a joint that stood still. The statistic grows with the samples: that a correlation is
+    there, not that it is large.
+    """
+    grid = seen.longest
+    laid = lay_on(seen.y[grid.first : grid.last], grid)[: _CONFIG.longest]
+    travel = np.nanmax(laid, axis=0) - np.nanmin(laid, axis=0)
+    still = travel < 2.5 * encoder_resolution(seen.good)
+    statistic, each = whiteness(innovations(laid, observer))
+    correlation = np.sqrt((each**2).mean(axis=0))
+    return np.where(still, np.nan, statistic), np.where(still, np.nan, correlation)
+
+
+def _verdict(statistic: float, correlation: float) -> str:
+    if np.isnan(statistic):
+        return "none: the joint stands still"
+    if abs(statistic) < _CONFIG.white:
+        return "white: the observer takes from the encoder all that a model of random jerk can"
+    if correlation < _CONFIG.slight:
+        words = "the motion is smoother than random jerk, the standard deviations hold"
+        return f"nearly white, correlation {correlation:.2f}: {words}"
+    words = "an encoder error with a pattern, a vibration, or a jerk level that was given and does "
+    words += "not fit; the standard deviations may be too small"
+    return f"coloured, correlation {correlation:.2f}: {words}"
+
+
+def _series(seen: Measured, found: Reconstructed, error: Array, longest: slice) -> Series:
+    kept, t = seen.good.kept, seen.good.log.t
+    size = max(1, -(-len(kept) // _CONFIG.buckets))
+    first = np.arange(0, len(kept), size)
+    std = found.std or (np.full_like(found.motion.q, np.nan),) * 3
+    shown = np.nan_to_num(error[longest][: _CONFIG.longest])
+    middle = t[np.minimum(first + size // 2, len(t) - 1)]
+
+    def envelope(x: Array) -> Array:
+        """(2 buckets, joints): lowest and highest of each bucket, NaN where it has none."""
+        low = np.minimum.reduceat(np.where(np.isnan(x), np.inf, x), first, axis=0)
+        high = np.maximum.reduceat(np.where(np.isnan(x), -np.inf, x), first, axis=0)
+        both = np.stack([low, high], axis=1).reshape(-1, x.shape[1])
+        return np.where(np.isfinite(both), both, np.nan)
+
+    return Series(
+        np.stack([t[first], middle], axis=1).ravel(),
+        envelope(error),
+        envelope(found.motion.dq[kept]),
+        envelope(std[1][kept]),
+        envelope(found.motion.ddq[kept]),
+        envelope(std[2][kept]),
+        *welch(shown, 1.0 / seen.step),
+    )
