@@ -78,7 +78,19 @@ def local_polynomial(
         raise InputRejected("T08", words, remedy="record longer")
     step = _CONFIG.at_once
     parts = [_solve(records, frequency[a : a + step]) for a in range(0, len(frequency), step)]
-    response, noise, weight, power = (np.concatenate(z) for z in zip(*parts, strict=True))
+    found = [np.concatenate(z) for z in zip(*parts, strict=True)]
+    return _responses(records, frequency, *found)
+
+
+def _responses(
+    records: list[_Record],
+    frequency: Array,
+    response: Complex,
+    noise: Complex,
+    weight: Array,
+    power: Array,
+) -> Responses:
+    """With coherence, and how many neighbouring frequencies make one independent estimate."""
     there = weight > 0.0
     if not there.any():
         words = "the excitation has no power at the frequencies asked for"

@@ -139,18 +139,9 @@ def others_held(
     if not others:
         return None
     kept = [torque, position, *others]
-    scale = np.stack([np.ones_like(rigid), *(1.0 / rigid for _ in kept[1:])], axis=1)
     values = responses.response[:, kept]
     covariance = responses.covariance[:, kept][:, :, kept]
-    alike = _CONFIG.alike * f / (responses.correlated * float(np.median(np.diff(f))))
-    rows = _Rows(
-        values[:, 0],
-        (values * scale)[:, 1:],
-        covariance * scale[:, :, None] * np.conj(scale[:, None, :]),
-        _CONFIG.floor * np.sqrt(np.maximum(alike, 1.0)) * np.abs(values[:, 0]),
-        np.asarray(2j * np.pi * f),
-        len(f) / responses.correlated,
-    )
+    rows = _rows(responses, values, covariance, rigid)
     own = rows.acceleration[:, :1]
     alone = _with_modes(
         replace(rows, acceleration=own, covariance=rows.covariance[:, :2, :2]), most[:0]
@@ -174,6 +165,22 @@ def others_held(
     couplings = np.stack([one[:, 1:] for one in _drawn(rows, fit)]) / rigid[:, None]
     rest = values[:, 0] - np.einsum("dbk,bk->db", couplings, values[:, 2:])
     return Held(closed_loop(held), np.asarray(values[:, 1] / rest))
+
+
+def _rows(responses: Responses, values: Complex, covariance: Complex, rigid: Complex) -> _Rows:
+    """Equations of `values` (bins, channels), torque and positions, and of their covariance."""
+    f = responses.frequency
+    scale = np.repeat(1.0 / rigid[:, None], values.shape[1], axis=1)
+    scale[:, 0] = 1.0
+    alike = _CONFIG.alike * f / (responses.correlated * float(np.median(np.diff(f))))
+    return _Rows(
+        values[:, 0],
+        (values * scale)[:, 1:],
+        covariance * scale[:, :, None] * np.conj(scale[:, None, :]),
+        _CONFIG.floor * np.sqrt(np.maximum(alike, 1.0)) * np.abs(values[:, 0]),
+        np.asarray(2j * np.pi * f),
+        len(f) / responses.correlated,
+    )
 
 
 def _with_modes(rows: _Rows, most: Array, known_shape: Array | None = None) -> _Fit:

@@ -125,19 +125,8 @@ def turned_joint(log: ExperimentLog) -> Turned:
     """
     joint, quantity = _described(log)
     good, where, j = usable(log), log.source or log.name, joint - 1
-    if good.time.jitter > LARGEST_JITTER:
-        jitter = percent(good.time.jitter)
-        words = f"the sampling interval varies by {jitter} rms: a spectrum needs even sampling"
-        raise InputRejected("T05", words, where, remedy="sample by a timer and record again")
     mended = good.log
-    if _constant(mended["v"][:, j]):
-        remedy = "inject a multisine or noise at that joint (design-excitation --experiment frf "
-        words = f"v does not excite joint {joint}"
-        raise InputRejected("D09", words, where, remedy=f"{remedy}plans it)")
-    for name in (quantity, "q"):
-        if _constant(mended[name][:, j]):
-            words = f"{name} of joint {joint} is constant while v excites it"
-            raise InputRejected("D04", words, where, remedy="look at this channel in the recording")
+    _refuse_silent(good, joint, quantity, where)
     position = mended.q - (mended["q_ref"] if "q_ref" in mended else _slow(mended.q))
     speed = mended["dq_ref"][:, j] if "dq_ref" in mended else mended.q[:, j]
     own = [mended["v"][:, j], mended[quantity][:, j], position[:, j], mended.tau[:, j]]
@@ -202,6 +191,22 @@ def _described(log: ExperimentLog) -> tuple[int, str]:
         remedy += "; under PD say so in /controller, torque is the input then"
         raise missing(f"an frf log under '{law}' without r, the input of the plant", remedy)
     return log.joint, "r"
+
+
+def _refuse_silent(good: Usable, joint: int, quantity: str, where: str) -> None:
+    """Refuse uneven sampling, T05, v that does not excite, D09, and a constant signal, D04."""
+    if good.time.jitter > LARGEST_JITTER:
+        jitter = percent(good.time.jitter)
+        words = f"the sampling interval varies by {jitter} rms: a spectrum needs even sampling"
+        raise InputRejected("T05", words, where, remedy="sample by a timer and record again")
+    if _constant(good.log["v"][:, joint - 1]):
+        remedy = "inject a multisine or noise at that joint (design-excitation --experiment frf "
+        words = f"v does not excite joint {joint}"
+        raise InputRejected("D09", words, where, remedy=f"{remedy}plans it)")
+    for name in (quantity, "q"):
+        if _constant(good.log[name][:, joint - 1]):
+            words = f"{name} of joint {joint} is constant while v excites it"
+            raise InputRejected("D04", words, where, remedy="look at this channel in the recording")
 
 
 def _constant(channel: Array) -> bool:

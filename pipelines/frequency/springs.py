@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.fit.bounded import least_squares
+from pipelines.fit.bounded import Minimum, least_squares
 from pipelines.frequency.config import ModesConfig, SpringsConfig
 from pipelines.frequency.modes import Pair
 from pipelines.frequency.spectra import Array
@@ -104,10 +104,7 @@ def explain(
     count = sum(springs)
     if not pairs or any(len(own) != count for own in pairs):
         return None
-    kinds = [([p.antiresonance for p in own], [p.resonance for p in own]) for own in pairs]
-    found = [[m.frequency for m in (*low, *high)] for low, high in kinds]
-    measured = np.log([[f.value for f in own] for own in found])
-    std = np.array([[f.std / f.value for f in own] for own in found])
+    measured, std = _frequencies(pairs)
     spread = np.hypot(std, slack)
     known = np.maximum(inertia_std if len(inertia_std) else np.zeros(len(inertia)), _CONFIG.known)
     geared = springs == (True, False)
@@ -132,19 +129,34 @@ def explain(
         for start in _starts(pairs[0], inertia[0], springs)
         for rotor in ([[-4.0], [0.0]] if geared else [[]])
     ]
-    best = min(
-        (least_squares(rest, start) for start in starts), key=lambda one: float(one.rest @ one.rest)
-    )
+    best = min((least_squares(rest, start) for start in starts), key=_misfit)
     # the rest, not what was granted, says how well the numbers are known
     weight = np.ones(len(best.rest))
     weight[: spread.size] = (spread / np.hypot(std, _CONFIG.floor)).ravel()
     freedom = spread.size - numbers
     left = float(((best.rest * weight) ** 2).sum()) / max(freedom, 1)
     jac = best.slope * weight[:, None]
-    covariance = np.linalg.pinv(jac.T @ jac)[: 2 * count, : 2 * count] * max(left, 1.0)
+    inverse = np.linalg.pinv(jac.T @ jac)[: 2 * count, : 2 * count]
+    covariance = np.asarray(inverse * max(left, 1.0), dtype=np.float64)
     worst = float(np.abs(best.rest[: spread.size] * spread.ravel()).max())
-    misfit = float(best.rest @ best.rest)
-    return Explained(*_taken(best.x, springs), covariance, misfit, worst, freedom)
+    return Explained(*_taken(best.x, springs), covariance, _misfit(best), worst, freedom)
+
+
+def _misfit(found: Minimum) -> float:
+    """χ²."""
+    return float(found.rest @ found.rest)
+
+
+def _frequencies(pairs: Sequence[Sequence[Pair]]) -> tuple[Array, Array]:
+    """Logarithms of antiresonances, then resonances (postures, frequencies), and their stds."""
+    found = []
+    for own in pairs:
+        modes = [*(p.antiresonance for p in own), *(p.resonance for p in own)]
+        found.append(
+            [(np.log(m.frequency.value), m.frequency.std / m.frequency.value) for m in modes]
+        )
+    both = np.array(found)
+    return both[..., 0], both[..., 1]
 
 
 def _taken(theta: Array, springs: tuple[bool, bool]) -> tuple[Spring | None, Spring | None]:
