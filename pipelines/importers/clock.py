@@ -12,14 +12,14 @@ import itertools
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from pipelines.errors import Check, InputRejected
-from pipelines.importers.config import CLOCK
-from pipelines.importers.evidence import Guess, Slope, units_of_ratio
-from pipelines.importers.groups import Group, unit_of_group
+from pipelines.importers.columns import Group, own_units
+from pipelines.importers.config import CLOCK, SCORES
+from pipelines.importers.evidence import OTHER, Clue, Guess, Slope, units_of_ratio, unsure, weigh
 from pipelines.importers.names import quantity_of, read_name, words_of
 from pipelines.importers.notes import Statement, stated_scale, stated_unit
 from pipelines.importers.raw import RawTable
@@ -63,6 +63,13 @@ def counted_on(stamps: Array) -> tuple[Array, float]:
     return stamps + full * np.concatenate([[0.0], np.cumsum(steps < 0)]), full
 
 
+def round_rate(rate: float) -> float:
+    """Return the next round rate below, as recorders are set to. [Hz]"""
+    decade = 10.0 ** np.floor(np.log10(rate))
+    rounds = (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
+    return float(max(m for m in rounds if m * decade <= rate * (1 + 1e-9)) * decade)
+
+
 def time_of(table: RawTable, spec: TimeSpec, assume: bool = False) -> tuple[Array, list[Check]]:
     """Return time stamps [s], NaN where one is missing.
 
@@ -75,67 +82,63 @@ def time_of(table: RawTable, spec: TimeSpec, assume: bool = False) -> tuple[Arra
         step = 1.0 / spec.rate
     if spec.column is None:  # the recipe was checked: then there is a rate
         return table.rows * np.float64(step or math.nan), []
-    if len(spec.parts) > 1:
-        return _summed(table, spec, step), []
-    column, declared = spec.parts[0]
-    name = table.name_of(column, "t")
-    where = f"{table.source}, column '{name}'"
-    stamps = table.columns[name].copy()
-    known = np.isfinite(stamps)
-    stamps[known], full = counted_on(stamps[known])
-    finite = stamps[known]
-    if finite.size <= 1 or not (np.diff(finite) > 0).any():
-        count = f"{finite.size} time stamp{'s' if finite.size != 1 else ''}"
-        message = f"{count}, none later than another"
-        raise InputRejected("T08", message, where=where, remedy="record again")
-    median = median_step(finite)
-    header = table.units.get(name)
-    unit = declared or header
+    names = [table.name_of(column, "t") for column, _ in spec.parts]
+    where = f"{table.source}, column{'s' * (len(names) > 1)} '{', '.join(names)}'"
+    for name in names:
+        if (count := int(np.isfinite(table.columns[name]).sum())) <= 1:
+            message = f"{count} time stamp{'s' * (count != 1)}, none later than another"
+            raise InputRejected("T08", message, where=where, remedy="record again")
     checks: list[Check] = []
-    if full:
-        message = f"the counter of time starts again after {full:.10g}: counted on"
-        remedy = "none needed, unless the clock was set back by just so much"
-        checks.append(Check.of("S08", "warn", message, where=where, remedy=remedy))
-    if unit is None:
-        unit = _detected(median, step, where, assume, checks)
-    elif not declared:
-        message = f"unit '{unit}' of time taken from the header"
-        checks.append(Check.of("S06", "ok", message, where=where))
-    elif header and _contradict(header, declared):
-        message = f"the header says '{header}', the recipe says '{declared}'"
-        remedy = "correct one of them: the unit in [time], or the header"
-        raise InputRejected("S08", message, where=where, remedy=remedy)
-    if unit in _INDEX and step is None:
-        message = "time is a sample index, but no rate is declared"
-        raise InputRejected("S08", message, where=where, remedy="add rate = … [Hz] to [time]")
-    factor = step if unit in _INDEX and step else to_si(unit, "time", where=where).factor
-    _refuse_implausible(median, factor, unit, step, where)
+    if names[1:]:
+        unit, factor = "s", 1.0
+        stamps = _summed(
+            table, [(n, u) for n, (_, u) in zip(names, spec.parts, strict=True)], where
+        )
+    else:
+        stamps = table.columns[names[0]].copy()
+        known = np.isfinite(stamps)
+        stamps[known], full = counted_on(stamps[known])
+        if full:
+            message = f"the counter of time starts again after {full:.10g}: counted on"
+            remedy = "none needed, unless the clock was set back by just so much"
+            checks.append(Check.of("S08", "warn", message, where=where, remedy=remedy))
+        unit, said = _unit_of_stamps(
+            spec.parts[0][1],
+            table.units.get(names[0]),
+            median_step(stamps[known]),
+            step,
+            where,
+            assume,
+        )
+        checks += said
+        if unit in _INDEX and step is None:
+            message = "time is a sample index, but no rate is declared"
+            raise InputRejected("S08", message, where=where, remedy="add rate = … [Hz] to [time]")
+        factor = step if unit in _INDEX and step else to_si(unit, "time", where=where).factor
+    finite = stamps[np.isfinite(stamps)]
+    if not (np.diff(finite) > 0).any():
+        message = f"{finite.size} time stamps, none later than another"
+        raise InputRejected("T08", message, where=where, remedy="choose another column of time")
+    _refuse_implausible(median_step(finite), factor, unit, step, where)
     # An epoch: seconds since 1970 cost digits.
-    origin = finite[0] if abs(finite[0]) > CLOCK.epoch * median * finite.size else 0.0
-    if origin:
-        message = f"time starts at {finite[0]:.16g} {unit}; counted from there"
+    origin = 0.0
+    if abs(finite[0]) > CLOCK.epoch * median_step(finite) * finite.size:
+        origin = finite[0]
+        message = f"time starts at {origin:.16g} {unit}; counted from there"
         checks.append(Check.of("S08", "ok", message, where=where))
     return (stamps - origin) * factor, checks
 
 
-def _summed(table: RawTable, spec: TimeSpec, step: float | None) -> Array:
+def _summed(table: RawTable, parts: Sequence[tuple[str, str | None]], where: str) -> Array:
     """Return the sum of columns [s], large ones from their first stamp: no digit is lost."""
     total = np.zeros(table.rows.size)
-    for column, unit in spec.parts:
-        name = table.name_of(column, "t")
-        stamps, where = table.columns[name], f"{table.source}, column '{name}'"
-        finite = stamps[np.isfinite(stamps)]
-        if unit is None or finite.size <= 1:
-            message = "no unit" if unit is None else "no time stamps"
+    for name, unit in parts:
+        if unit is None:
             remedy = 'give [time] one unit a column: unit = ["s", "ns"]'
-            raise InputRejected("S08", message, where=where, remedy=remedy)
-        factor = to_si(unit, "time", where=where).factor
-        total += (stamps - (finite[0] if abs(finite[0]) * factor > CLOCK.epoch else 0.0)) * factor
-    where = f"{table.source}, columns {', '.join(str(column) for column, _ in spec.parts)}"
-    if not (np.diff(total[np.isfinite(total)]) > 0).any():
-        message, remedy = "no time stamp is later than another", "choose other columns of time"
-        raise InputRejected("T08", message, where=where, remedy=remedy)
-    _refuse_implausible(median_step(total[np.isfinite(total)]), 1.0, "s", step, where)
+            raise InputRejected("S08", "no unit", where=where, remedy=remedy)
+        factor, stamps = to_si(unit, "time", where=where).factor, table.columns[name]
+        first = stamps[np.isfinite(stamps)][0]
+        total += (stamps - (first if abs(first) * factor > CLOCK.epoch else 0.0)) * factor
     return total
 
 
@@ -148,10 +151,10 @@ def _contradict(header: str, declared: str) -> bool:
     return known and declared in UNITS and UNITS[header] != UNITS[declared]
 
 
-def _plausible_units(median: float) -> list[str]:
-    """Return the units in which a median step gives a rate that robots are recorded at."""
+def _plausible(median: float) -> dict[str, float]:
+    """Return the units in which a median step gives a rate that robots are recorded at [Hz]."""
     rates = {unit: 1.0 / (median * SECONDS[unit]) for unit in _COMMON}
-    return [unit for unit, rate in rates.items() if CLOCK.slowest <= rate <= CLOCK.fastest]
+    return {unit: rate for unit, rate in rates.items() if CLOCK.slowest <= rate <= CLOCK.fastest}
 
 
 def _fitting(median: float, step: float) -> list[str]:
@@ -160,24 +163,34 @@ def _fitting(median: float, step: float) -> list[str]:
     return fits or (["sample"] if median == 1.0 else [])
 
 
-def _detected(
-    median: float, step: float | None, where: str, assume: bool, checks: list[Check]
-) -> str:
-    """S08: return the unit of time stamps without a declaration, where only one is possible."""
+def _unit_of_stamps(
+    declared: str | None,
+    header: str | None,
+    median: float,
+    step: float | None,
+    where: str,
+    assume: bool,
+) -> tuple[str, list[Check]]:
+    """S08: return the unit of time stamps: the recipe's, the header's, or the only possible one."""
+    if declared:
+        if header and _contradict(header, declared):
+            message = f"the header says '{header}', the recipe says '{declared}'"
+            remedy = "correct one of them: the unit in [time], or the header"
+            raise InputRejected("S08", message, where=where, remedy=remedy)
+        return declared, []
+    if header:
+        message = f"unit '{header}' of time taken from the header"
+        return header, [Check.of("S06", "ok", message, where=where)]
     fits = _fitting(median, step) if step is not None else []
     if step is not None and len(fits) == 1:
-        message = (
-            f"unit of time not declared; {fits[0]} fits the declared rate of {1 / step:.6g} Hz"
-        )
+        message = f"unit of time not declared; {fits[0]} fits the declared rate of "
         remedy = f'add unit = "{fits[0]}" to [time]'
-        checks.append(Check.of("S08", "warn", message, where=where, remedy=remedy))
-        return fits[0]
+        words = f"{message}{1 / step:.6g} Hz"
+        return fits[0], [Check.of("S08", "warn", words, where=where, remedy=remedy)]
     if step is None and assume:
         message = "unit of time not declared; taken as s, as --assume-units says"
-        remedy = "write the unit in the recipe"
-        checks.append(Check.of("S04", "warn", message, where=where, remedy=remedy))
-        return "s"
-    rates = [f"{u} ({1 / (median * SECONDS[u]):.4g} Hz)" for u in _plausible_units(median)]
+        return "s", [Check.of("S04", "warn", message, where=where, remedy="write it in the recipe")]
+    rates = [f"{unit} ({rate:.4g} Hz)" for unit, rate in _plausible(median).items()]
     options = ", ".join(rates) or "none plausible"
     message = f"unit of time not declared; its step of {median:.6g} could be: {options}"
     raise InputRejected("S08", message, where=where, remedy="add unit or rate to [time]")
@@ -194,7 +207,7 @@ def _refuse_implausible(
         remedy = "correct unit or rate in [time]"
         raise InputRejected("S08", message, where=where, remedy=remedy)
     if step is None and not CLOCK.slowest / 10 <= found <= 10 * CLOCK.fastest:
-        right = " or ".join(_plausible_units(median)) or "a sample index"
+        right = " or ".join(_plausible(median)) or "a sample index"
         message = f"time in {unit} makes {found:.6g} Hz; {right} looks right"
         remedy = "correct the unit in [time], or add the rate to confirm it"
         raise InputRejected("S08", message, where=where, remedy=remedy)
@@ -216,6 +229,8 @@ class Clock:
 def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
     """Return the clock of the recording; None where no column rises like one.
 
+    Columns named a time come first, then unnamed ones with even steps, then counters.
+
     Raises:
         InputRejected: T01, the only column of time runs backwards.
     """
@@ -225,7 +240,7 @@ def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
     )
 
     def single(column: str) -> Clock:
-        unit = unit_of_group([column], table)[0] or ""
+        unit = own_units([column], table)[0] or ""
         return Clock((column,), (unit,), counted_on(table.columns[column])[0])
 
     def unevenness(values: Array) -> float:
@@ -246,19 +261,15 @@ def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
         return next(c for c, u in zip(found, uneven, strict=True) if u <= best)
     if plain[2:] and (clock := _pair(table, plain[0], plain[1], named=False)):
         return clock
-    even = [
-        c
-        for c in (plain[:2] if [*table.columns][2:] else [])
-        if (np.diff(table.columns[c]) > 0).all() and unevenness(table.columns[c]) < CLOCK.even
-    ]
+    columns = {c: table.columns[c] for c in (plain[:2] if [*table.columns][2:] else [])}
+    even = [c for c, x in columns.items() if (np.diff(x) > 0).all() and unevenness(x) < CLOCK.even]
     if even:
         return single(min(even, key=lambda c: _counts(table.columns[c])))
-    counted = [c for c in counters if _rises(table.columns[c])]
-    if not counted:
+    counted = next((c for c in counters if _rises(table.columns[c])), None)
+    if counted is None:
         return None
-    values = table.columns[counted[0]]
-    by_one = np.median(np.diff(values)) == 1.0  # KUKA's IPOC counts ms, in steps of its cycle
-    return Clock((counted[0],), ("sample" if by_one else "",), values)
+    by_one = np.median(np.diff(table.columns[counted])) == 1.0  # KUKA's IPOC counts ms
+    return Clock((counted,), ("sample" if by_one else "",), table.columns[counted])
 
 
 def _rises(values: Array) -> bool:
@@ -294,14 +305,14 @@ def _pair(table: RawTable, whole: str, fraction: str, named: bool) -> Clock | No
     return None
 
 
-def clock_as_stated(
+def guess_unit(
     clock: Clock,
     q: Array | None,
     slope: Slope | None,
     notes: Sequence[str],
     stated: Statement | None,
-) -> tuple[str, Guess]:
-    """Return the unit of a clock, "" where it stays open, and the reason.
+) -> Guess:
+    """Return the unit of a clock, with the reason.
 
     Args:
         q: (samples, joints) positions in any unit.
@@ -309,97 +320,89 @@ def clock_as_stated(
         notes: lines of the file, that may state the unit.
         stated: the rate that the file states.
     """
-    own = clock.units[0]
-    said = stated_unit(notes, "time") if not clock.paired and not own else None
-    if said is not None and said.value:
-        clock = replace(clock, units=(said.value,))
-    unit, guess = _unit_of_clock(clock, q, slope)
-    if said is not None and said.value and guess.confidence == "sure":
-        why = guess.why.replace("named so", f"the file states {said.words}")
-        guess = replace(guess, confidence="likely", why=why)
-    if not clock.units[0] and (ticks := stated_scale(notes, "time")):
-        return "", Guess("", "unsure", f"the file states '{ticks[0].words}'")
-    if stated is None or clock.paired or guess.confidence == "sure" or unit == "sample":
-        return unit, guess
-    step = median_step(clock.values)
-    words = f"a median step of {step:.4g}, and the file states {stated.words}"
-    periods = {other: step * size * stated.number for other, size in SECONDS.items()}
-    fits = [other for other, x in periods.items() if abs(x - 1.0) < CLOCK.same_rate]
-    if len(fits) == 1 and unit in ("", fits[0]):
-        return fits[0], Guess(fits[0], "likely", words)
-    if step == 1.0 and not unit and math.isfinite(stated.number):
-        return "sample", Guess("sample", "likely", words)
-    return "", Guess("", "unsure", f"{guess.why}; but {words}" if unit else guess.why)
-
-
-def _unit_of_clock(clock: Clock, q: Array | None, slope: Slope | None) -> tuple[str, Guess]:
-    """Return the unit that names and numbers show, "" where it stays open, and the reason."""
-    median, named = median_step(clock.values), clock.units[0]
+    median, own = median_step(clock.values), clock.units[0]
     if clock.paired:
         rise = f"rise by {median:.4g} s, {1 / median:.4g} Hz"
-        return "s", Guess("s", "sure", f"whole seconds and {clock.units[1]} together {rise}")
-    if named == "sample":
-        return "sample", Guess("sample", "likely", "named a counter: the rate is not in the file")
-    if named and named not in SECONDS:
-        return "", Guess("", "unsure", f"its name or header says '{named}': s, ms, us or ns?")
-    rates = {unit: 1.0 / (median * f) for unit, f in SECONDS.items()}
+        return Guess("s", "sure", f"whole seconds and {clock.units[1]} together {rise}")
+    if own == "sample":
+        return Guess("sample", "likely", "named a counter: the rate is not in the file")
+    if own and own not in SECONDS:
+        return unsure(f"its name or header says '{own}': s, ms, us or ns?")
+    if not own and (ticks := stated_scale(notes, "time")):
+        return unsure(f"the file states '{ticks[0].words}'")
+    said = stated_unit(notes, "time") if not own else None
+    named = own or (said.value if said else "")
+    rates = {unit: 1.0 / (median * seconds) for unit, seconds in SECONDS.items()}
+    low, high = CLOCK.slowest, CLOCK.unnamed_fastest
     ratios = {unit: slope.factor / SECONDS[unit] for unit in _COMMON} if slope else {}
-    by_velocity = [unit for unit, r in ratios.items() if units_of_ratio(r, CLOCK.same_rate)]
-    low, high = CLOCK.unnamed_slowest, CLOCK.unnamed_fastest
+    agrees = [unit for unit, r in ratios.items() if units_of_ratio(r, CLOCK.same_rate)]
     if named and 0.1 * low <= rates[named] <= 10.0 * high:
+        why = "named so" if said is None else f"the file states {said.words}"
+        why += f", and a median step of {median:.4g} makes {rates[named]:.4g} Hz"
+        clues = [Clue(named, SCORES.sure if own else SCORES.stated, why)]
         problem = ""
-        if by_velocity and named not in by_velocity:
-            others = " or ".join(by_velocity)
+        if agrees and named not in agrees:
+            others = " or ".join(agrees)
             problem = f"the recorded velocity is the slope of the position in {others}"
-        elif rates[named] < low and q is not None and not _paced([named], clock.values, q):
+        elif rates[named] < low and q is not None and not _paced(named, clock.values, q):
             problem = f"that makes {rates[named]:.4g} Hz, and a motion too slow for a robot"
         if problem:
-            return "", Guess("", "unsure", f"its name or header says '{named}', but {problem}")
-        why = f"named so, and a median step of {median:.4g} makes {rates[named]:.4g} Hz"
-        return named, Guess(named, "sure", why)
+            return unsure(f"its name or header says '{named}', but {problem}")
+    else:
+        clues = _clues_by_numbers(clock.values, q, agrees, rates)
+    if stated is not None and not own:
+        words = f"a median step of {median:.4g}, and the file states {stated.words}"
+        periods = {unit: stated.number / rate for unit, rate in rates.items()}
+        fits = [unit for unit, x in periods.items() if abs(x - 1.0) < CLOCK.same_rate]
+        counted = median == 1.0 and math.isfinite(stated.number)
+        value = fits[0] if len(fits) == 1 else "sample" if counted else OTHER
+        clues.append(Clue(value, SCORES.stated, words))
+    return weigh(clues)
+
+
+def _clues_by_numbers(
+    stamps: Array, q: Array | None, agrees: Sequence[str], rates: dict[str, float]
+) -> list[Clue]:
+    """Return the clues of rate, pace and velocity to the unit of a clock without one."""
+    median, low, high = median_step(stamps), CLOCK.slowest, CLOCK.unnamed_fastest
     plausible = [unit for unit, rate in rates.items() if low <= rate <= high]
     since = [
         (unit, year)
         for unit, year, offset in _EPOCHS
         if unit in plausible
-        and CLOCK.from_2001 < clock.values[0] * SECONDS[unit] - offset < CLOCK.to_2096
+        and CLOCK.from_2001 < stamps[0] * SECONDS[unit] - offset < CLOCK.to_2096
     ]
     if len({unit for unit, _ in since}) == 1:
         unit, years = since[0][0], " or ".join(year for _, year in since)
         why = f"counted since the year {years}, and a median step of {median:.4g} makes"
-        return unit, Guess(unit, "sure", f"{why} {rates[unit]:.4g} Hz")
+        return [Clue(unit, SCORES.sure, f"{why} {rates[unit]:.4g} Hz")]
     fits = [unit for unit in plausible if unit in _COMMON]
+    paced = [unit for unit in fits if q is None or _paced(unit, stamps, q)]
     would = " or ".join(f"{rates[unit]:.4g} Hz in {unit}" for unit in fits)
     why = f"a median step of {median:.4g} would be {would or 'no plausible rate'}"
-    paced = fits if q is None else _paced(fits, clock.values, q)
     if len(paced) < len(fits):
         why += "; the pace of the motion leaves " + (" or ".join(paced) or "none")
-    agreeing = [unit for unit in paced if unit in by_velocity]
+    clues = [Clue(unit, SCORES.plausible, why) for unit in paced] or [Clue(OTHER, 0.0, why)]
+    agreeing = [unit for unit in paced if unit in agrees]
     if len(agreeing) == 1:
-        return agreeing[0], Guess(agreeing[0], "likely", f"{why}; the recorded velocity agrees")
-    counts = _counts(clock.values)
-    if len(paced) == 1 and not counts:
-        return paced[0], Guess(paced[0], "likely", why)
-    also = '; 0, 1, 2, … may also count samples: then unit = "sample" and rate = … [Hz]'
-    return "", Guess("", "unsure", why + also * counts)
+        clues.append(Clue(agreeing[0], SCORES.fits, "the recorded velocity agrees"))
+    elif len(paced) == 1:
+        clues.append(Clue(paced[0], SCORES.fits))
+    if _counts(stamps) and len(agreeing) != 1:
+        also = '0, 1, 2, … may also count samples: then unit = "sample" and rate = … [Hz]'
+        clues.append(Clue("sample", SCORES.plausible, also))
+        clues += [Clue(unit, -SCORES.fits) for unit in paced]
+    return clues
 
 
-def _paced(units: Sequence[str], t: Array, q: Array) -> list[str]:
-    """Return the units in which the largest mean speed over a hundredth of the log is a robot's."""
+def _paced(unit: str, t: Array, q: Array) -> bool:
+    """Return whether the largest mean speed over a hundredth of the log is a robot's in a unit."""
     span = float(np.ptp(q, axis=0).max())
     width = max(1, t.size // 100)
     elapsed = t[width:] - t[:-width]
     moved = np.abs(q[width:] - q[:-width]).max(axis=1)
     good = elapsed > 0
     if span == 0.0:
-        return list(units)
+        return True
     pace = float((moved[good] / elapsed[good]).max()) / span if good.any() else 0.0
-    low, high = CLOCK.slowest_pace, CLOCK.fastest_pace
-    return [unit for unit in units if low <= pace / SECONDS[unit] <= high]
-
-
-def round_rate(rate: float) -> float:
-    """Return the next round rate below, as recorders are set to. [Hz]"""
-    decade = 10.0 ** np.floor(np.log10(rate))
-    rounds = (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
-    return float(max(m for m in rounds if m * decade <= rate * (1 + 1e-9)) * decade)
+    return CLOCK.slowest_pace <= pace / SECONDS[unit] <= CLOCK.fastest_pace

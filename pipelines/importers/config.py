@@ -94,12 +94,37 @@ class Choice:
 
 
 @dataclass(frozen=True)
+class Scores:
+    """Scores of hypotheses, about the logarithm of a likelihood ratio.
+
+    Of units first: a value is filled in where it has `enough`, and `margin` more than any other.
+    """
+
+    sure: float = 10.0  # a name or header says the unit; the only century that stamps count to
+    stated: float = 7.0  # a line of the file, a velocity, or a counter of one turn
+    fits: float = 5.0  # the only unit that fits limits, rate or the robot's links
+    doubt: float = 3.0  # a motor's, a share of a range or counts as well
+    plausible: float = 1.0
+    enough: float = 4.0
+    margin: float = 3.0
+    # Of columns: the best is taken, each difference larger than the sum of those below it.
+    named: float = 20.0  # a word says the quantity
+    unnamed: float = 10.0  # columns of joints that no word explains
+    in_order: float = 8.0  # the robot's joints are named
+    current: float = 4.0  # less than torque
+    measured: float = 2.0  # more than plain
+    of_motor: float = 1.0  # less than the joint's
+    filtered: float = 0.5  # less than raw
+    command: float = 19.0  # less than a torque that was not commanded
+    refuted: float = 50.0  # not this signal: a part of it, or of another number of joints
+
+
+@dataclass(frozen=True)
 class Clock:
     """The time of a recording."""
 
     slowest: float = 1.0  # [Hz] what robots are recorded at
     fastest: float = 1e5  # [Hz]
-    unnamed_slowest: float = 1.0  # [Hz] of recordings whose time has no unit
     unnamed_fastest: float = 2e4  # [Hz]
     near: float = 0.2  # a rate within a fifth of the declared one is the declared one
     same_rate: float = 0.02
@@ -153,6 +178,8 @@ class Evidence:
     one_turn: float = 5e-3  # range of one recorded revolution over the resolution, less 1
     widest_rad: float = 400.0  # [rad] range of a motor in a recording
     share: float = 0.02  # of a bound: what keeps 0..1 and comes near both is a share of a range
+    share_above: float = 0.3  # of the range, below which it begins
+    share_below: float = 0.7  # of the range of both signs, below which it begins
     counts_span: float = 2000.0  # whole numbers over more are counts
     whole_span: float = 10.0  # whole numbers over more are counts or degrees
     all_whole: float = 0.99  # of numbers
@@ -212,6 +239,7 @@ class Repair:
 
 
 NAMES = Names()
+SCORES = Scores()
 ARRAYS = Arrays()
 TEXT = Text()
 CHOICE = Choice()

@@ -1,47 +1,70 @@
-"""Compare the columns of a recording with each other and with the robot's links.
+"""Weigh hypotheses, and compare the columns of a recording with each other.
 
-A velocity is the slope of its position; a counter jumps by its range; dry friction turns with the
-speed. Weight and inertia of the links follow from the robot's description; friction is fitted:
-
-    tau = a·tau_links(q, dq, ddq) + F sign(dq) + B dq + c
-
-The torque agrees with one unit of position, with one order of the joints and with angles that are
-counted from the link before or, behind parallel links, from the one before that, if with any.
+A hypothesis is a value that a recipe may take, such as a unit. A clue speaks for or against one
+with a score, about the logarithm of a likelihood ratio; the best hypothesis is taken where it is
+better than nothing and than every other by a margin. Names, lines of the file, limits of the robot
+and the numbers give the clues: a velocity is the slope of its position, a counter jumps by its
+range, dry friction turns with the speed.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.importers.config import EVIDENCE, LINKS
-from pipelines.io.limits import FEWEST
+from pipelines.importers.config import EVIDENCE, SCORES
 from pipelines.io.log import Array
 
 Confidence = Literal["sure", "likely", "unsure"]
+OTHER = "?"  # the hypothesis that no value is right
 # Slope of the position over the velocity, by their units: q in the first, dq in the second.
 _ANGULAR_RATIOS = {
     1.0: ("", ""), 180.0 / math.pi: ("deg", "rad/s"), math.pi / 180.0: ("rad", "deg/s"),
     1.0 / 60.0: ("rev", "rpm"), 6.0: ("deg", "rpm"), math.pi / 30.0: ("rad", "rpm"),
 }  # fmt: skip
-# (samples, joints) q, dq, ddq [rad] -> torque [N m]; None where links are unknown
-TorqueModel = Callable[[Array, Array, Array], Array | None]
-Motion = tuple[Array, Array, Array]  # q, dq, ddq
 
 
 @dataclass(frozen=True)
 class Guess:
-    """A value with how sure it is and why."""
+    """A value with how sure it is and why; "" where it stays open."""
 
     value: str
     confidence: Confidence
     why: str
+
+
+@dataclass(frozen=True)
+class Clue:
+    """A reason for a hypothesis (a positive score) or against it, in words."""
+
+    value: str
+    score: float
+    why: str = ""
+
+
+def unsure(why: str) -> Guess:
+    return Guess("", "unsure", why)
+
+
+def weigh(clues: Sequence[Clue]) -> Guess:
+    """Return the hypothesis of the best total score; open where another is nearly as good."""
+    totals: dict[str, float] = defaultdict(float)
+    for clue in clues:
+        totals[clue.value] += clue.score
+    ranked = sorted(totals, key=lambda value: -totals[value])
+    best = ranked[0] if ranked else OTHER
+    second = max([0.0, *(totals[value] for value in ranked[1:])])
+    if best == OTHER or totals[best] < SCORES.enough or totals[best] - second < SCORES.margin:
+        return unsure("; ".join(dict.fromkeys(clue.why for clue in clues if clue.why)))
+    words = dict.fromkeys(c.why for c in clues if c.why and c.value == best and c.score > 0.0)
+    return Guess(best, "sure" if totals[best] >= SCORES.sure else "likely", "; ".join(words))
 
 
 @dataclass(frozen=True)
@@ -86,23 +109,33 @@ def slope_of(q: Array, dq: Array, t: Array | None, every: bool = False) -> Slope
 
 def crossed(q: Array, dq: Array, t: Array | None) -> bool:
     """Return whether the position of one joint has the velocity of another for its slope."""
-    for j, k in itertools.permutations(range(q.shape[1]), 2):
-        other = slope_of(q[:, [j]], dq[:, [k]], t)
-        if other is not None and slope_of(q[:, [j]], dq[:, [j]], t) is None:
-            return True
-    return False
+    pairs = itertools.permutations(range(q.shape[1]), 2)
+    return any(
+        slope_of(q[:, [j]], dq[:, [k]], t) and not slope_of(q[:, [j]], dq[:, [j]], t)
+        for j, k in pairs
+    )
+
+
+def units_of_ratio(factor: float, tolerance: float = EVIDENCE.same_ratio) -> tuple[str, str] | None:
+    """Return the units of position and velocity that are a factor apart, ("", "") where equal.
+
+    A power of ten is of a wrong unit of time, not of angles: 0.1 is not the 0.105 of rad and rpm.
+    """
+    nearest = min(_ANGULAR_RATIOS, key=lambda ratio: abs(factor / ratio - 1.0))
+    off = abs(factor / nearest - 1.0)
+    if factor > 0 and off > abs(factor / 10.0 ** round(math.log10(factor)) - 1.0):
+        return None
+    return _ANGULAR_RATIOS[nearest] if off <= tolerance else None
 
 
 def rollover(values: Array) -> float | None:
     """Return the size of the jumps where a counter starts again: equal, larger than any step."""
-    steps = np.diff(values, axis=0)
-    size = float(np.ptp(values))
+    steps, size = np.diff(values, axis=0), float(np.ptp(values))
     large = np.abs(steps) > EVIDENCE.jump * size
     jumps = np.abs(steps[large]) if size > 0 else np.empty(0)
-    others = np.abs(steps[~large])
-    if not jumps.size or (others.size and others.max() > EVIDENCE.small_step * size):
+    if not jumps.size or np.ptp(jumps) > EVIDENCE.same_ratio * jumps.mean():
         return None
-    if np.ptp(jumps) > EVIDENCE.same_ratio * jumps.mean():
+    if np.abs(steps[~large]).max(initial=0.0) > EVIDENCE.small_step * size:
         return None
     back = np.abs(steps[1:] + steps[:-1])[np.abs(steps[1:]) > EVIDENCE.jump * size]
     if (back < EVIDENCE.small_step * size).any():
@@ -122,7 +155,21 @@ def quarter_turns(q: Array) -> dict[int, int]:
     start = q[0][far] / (0.5 * math.pi)
     if start.size <= 1 or np.abs(start - np.round(start)).max() > EVIDENCE.quarter_turn:
         return {}
-    return {int(j): int(x) for j, x in zip(far, np.round(start), strict=True)}
+    return dict(zip(far.tolist(), np.round(start).astype(int).tolist(), strict=True))
+
+
+def whole(values: Array) -> bool:
+    """Return whether nearly all numbers are whole."""
+    return bool((values == np.round(values)).mean() > EVIDENCE.all_whole)
+
+
+def is_share(values: Array) -> bool:
+    """Return whether numbers keep 0..1, 0..100, or ±, and reach the upper end, unlike joints."""
+    low, high, slack = float(values.min()), float(values.max()), EVIDENCE.share
+    full = 1.0 if max(high, -low) <= 1.0 + slack else 100.0
+    near = (1.0 - slack) * full <= high <= (1.0 + slack) * full
+    signed = -(1.0 + slack) * full <= low < -EVIDENCE.share_below * full
+    return near and (-slack * full <= low < EVIDENCE.share_above * full or signed)
 
 
 def held(tau: Array, q: Array) -> Guess:
@@ -132,11 +179,9 @@ def held(tau: Array, q: Array) -> Guess:
         steps = steps[np.abs(np.diff(q, axis=0)) > 0]
     share = float(np.mean(steps == 0)) if steps.size else 0.0
     if share > EVIDENCE.still and np.unique(tau).size > EVIDENCE.fewest:
-        still = (
-            f"{100 * share:.0f} % of the steps between samples are zero while the position moves"
-        )
-        why = "a command, held over several samples, or a measurement from a slower bus?"
-        return Guess("held-command", "unsure", f"{still}: {why}")
+        still = f"{100 * share:.0f} % of the steps between samples are zero while the position "
+        why = f"{still}moves: a command, held over several samples, or a slower bus?"
+        return Guess("held-command", "unsure", why)
     why = 'nothing in the numbers tells; ask who recorded them: "held-command" where this is what '
     why += "the drive was commanded, to be held until the next sample"
     return Guess("measured", "unsure", why)
@@ -175,13 +220,10 @@ def sign_of(q: Array, tau: Array, links: Array | None = None) -> Guess:
         return Guess("sign = -1?", "unsure", why)
     if wrong and (weight[signs < 0] < 0).all():
         why = f"sign: torque of joint {wrong} follows the robot's own links with the other sign"
-        listed = ", ".join("-1" if sign < 0 else "1" for sign in signs)
-        return Guess(f"[{listed}]", "likely", why)
+        return Guess(str([-1 if sign < 0 else 1 for sign in signs]), "likely", why)
     if wrong:
-        against = (
-            f"torque of joint {wrong} jumps against the speed where it reverses, unlike friction"
-        )
-        why = f"{against}: sign = -1 there, unless its transmission is negative"
+        why = f"torque of joint {wrong} jumps against the speed where it reverses, unlike friction"
+        why += ": sign = -1 there, unless its transmission is negative"
         return Guess("sign = -1?", "likely", why)
     if (weight > 0).all():
         return Guess("as recorded", "likely", "sign: torque follows the robot's own links")
@@ -212,178 +254,3 @@ def _jumps(
             if shift == 0:
                 jumps.append(numbers[0])
     return np.array(jumps), residuals
-
-
-def units_of_ratio(factor: float, tolerance: float = EVIDENCE.same_ratio) -> tuple[str, str] | None:
-    """Return the units of position and velocity that are a factor apart, ("", "") where equal.
-
-    A power of ten is of a wrong unit of time, not of angles: 0.1 is not the 0.105 of rad and rpm.
-    """
-    nearest = min(_ANGULAR_RATIOS, key=lambda ratio: abs(factor / ratio - 1.0))
-    off = abs(factor / nearest - 1.0)
-    if factor > 0 and off > abs(factor / 10.0 ** round(math.log10(factor)) - 1.0):
-        return None
-    return _ANGULAR_RATIOS[nearest] if off <= tolerance else None
-
-
-@dataclass(frozen=True)
-class LinkFit:
-    """The fit of a torque by weight and inertia of the robot's own links."""
-
-    gains: Array  # (joints,) recorded torque per N m of the links; nan where not explained
-    followed: bool  # at the joints that have most of the links' torque
-    alone: bool  # without any friction: computed, or simulated
-    varies: bool  # the links' torque changes over the motion
-    left: float  # unexplained share of the torque's change, mean of the joints
-    signs: Array  # (joints,) of weight and friction where both agree, else 0
-    otherwise: str = ""  # a far better explanation: joints exchanged, an angle of another link
-
-
-def fits_by_unit(
-    model: TorqueModel, q: Array, tau: Array, t: Array, factors: Mapping[str, Array]
-) -> dict[str, LinkFit]:
-    """Return the fit for each unit that positions `q` may be in; `factors` are SI, one a joint."""
-    torque = _smooth(tau, t)[0]
-    found: dict[str, LinkFit] = {}
-    if len(torque) < FEWEST:
-        return found  # the steps of time are too uneven
-    every = max(1, len(torque) // LINKS.samples_of_orders)
-    for unit, factor in factors.items():
-        q_si, dq, ddq = _smooth(np.unwrap(q * factor, axis=0), t)
-        links = model(q_si, dq, ddq)
-        if links is None or not np.isfinite(links).all():
-            continue
-        some = q_si[::every], dq[::every], ddq[::every]
-        otherwise = _otherwise(model, some, torque[::every])
-        found[unit] = replace(_fit_of_links(torque, links, dq), otherwise=otherwise)
-    return found
-
-
-def best_unit(fits: Mapping[str, LinkFit], proved: bool = True) -> str:
-    """Return the unit that explains the torque far better than any other; "" where none does.
-
-    Gears near 57 make radians of a motor look like degrees of a joint: proved is a unit in which
-    torques are N m as well.
-    """
-    by_fit = sorted(fits, key=lambda unit: fits[unit].left)
-    if not by_fit:
-        return ""
-    best = fits[by_fit[0]]
-    if len(by_fit) > 1 and best.left > LINKS.better * fits[by_fit[1]].left:
-        return ""
-    logs = np.abs(np.log(np.abs(best.gains[np.isfinite(best.gains)])))
-    sure = best.followed and best.varies and best.left < LINKS.proof
-    sure = sure and bool((logs < math.log(LINKS.unnamed_gain)).all())
-    return by_fit[0] if sure or not proved else ""
-
-
-def _fit_of_links(tau: Array, model: Array, dq: Array) -> LinkFit:
-    """Fit the recorded torque by that of the links' model and by friction.
-
-    The model explains a joint's torque where it takes most of what friction leaves.
-    """
-    rest, links = _without_friction(tau, dq), _without_friction(model, dq)
-    inner, power = (rest * links).sum(axis=0), (links**2).sum(axis=0)
-    explains = inner**2 > LINKS.explained * (rest**2).sum(axis=0) * power
-    gains = np.where(explains, inner / np.where(power > 0.0, power, 1.0), math.nan)
-    # Not at rest, or one joint at even speeds:
-    varies = bool(power.sum() >= LINKS.changes**2 * float(np.sum(model**2)))
-    followed = float(power[explains].sum()) > LINKS.most * float(power.sum())
-    residual = tau - np.nan_to_num(gains) * model
-    unexplained = np.var(residual, axis=0).sum()
-    alone = bool(unexplained < (1.0 - LINKS.alone) * np.var(tau, axis=0).sum())
-    signs = np.sign(np.nan_to_num(gains))
-    x, y = (v - v.mean(axis=0) for v in (residual, np.sign(dq)))
-    size = np.sqrt((x**2).sum(axis=0) * (y**2).sum(axis=0))
-    friction = (x * y).sum(axis=0) / np.where(size > 0.0, size, 1.0)
-    signs = np.where(signs * friction > LINKS.friction, signs, 0.0)
-    return LinkFit(gains, followed, alone, varies, _left(rest, links, tau), signs)
-
-
-def _without_friction(values: Array, dq: Array) -> Array:
-    """Return the residual of sign(dq), dq and 1, joint by joint; friction at rest may be any."""
-    rest = np.empty_like(values)
-    for j in range(values.shape[1]):
-        slow = max(LINKS.slow * float(np.abs(dq[:, j]).max()), 1e-300)
-        columns = [np.clip(dq[:, j] / slow, -1.0, 1.0), dq[:, j], np.ones(len(dq))]
-        friction = np.column_stack(columns)
-        numbers = np.linalg.lstsq(friction, values[:, j], rcond=None)[0]
-        rest[:, j] = values[:, j] - friction @ numbers
-    return rest
-
-
-def _left(rest: Array, links: Array, tau: Array) -> float:
-    """Return the share of a joint's torque that neither links nor friction explain, the mean."""
-    power = (links**2).sum(axis=0)
-    gain = (rest * links).sum(axis=0) / np.where(power > 0.0, power, 1.0)
-    gain = np.where(power > 0.0, gain, 0.0)
-    size = np.maximum(tau.var(axis=0), 1e-300)
-    return float(np.mean(((rest - gain * links) ** 2).mean(axis=0) / size))
-
-
-def _left_of(tau: Array, links: Array, dq: Array) -> float:
-    return _left(_without_friction(tau, dq), _without_friction(links, dq), tau)
-
-
-def _otherwise(model: TorqueModel, motion: Motion, tau: Array) -> str:
-    """Return under which other meaning q' = N^-1 q the links explain the torque far better.
-
-    Two joints the other way round, in the torque alone or in the motion as well; or a joint counted
-    from the link before the last, with either sign of that. The torque is then the joints' or,
-    where a drive turns it by such a rod, N^T times the drives'.
-    """
-    links, n = model(*motion), tau.shape[1]
-    if links is None:
-        return ""
-    changes: list[tuple[str, Array, bool]] = []
-    for a, b in itertools.combinations(range(n), 2):
-        exchange = np.eye(n)
-        exchange[[a, b]] = exchange[[b, a]]
-        words = f"joints {a + 1} and {b + 1} exchanged: in which order are they?"
-        changes.append((words, exchange, True))
-    for a, sign in itertools.product(range(n - 1), (1.0, -1.0)):
-        back = np.eye(n)  # N^-1
-        back[a + 1, a] = -sign
-        words = f"joint {a + 2} counted from link {a}, not from link {a + 1}"
-        changes.append((f"{words}: is it, or are two drives coupled?", back, False))
-    best, found = LINKS.better * _left_of(tau, links, motion[1]), ""
-    for words, change, exchanged in changes:
-        q, dq, ddq = (x @ change.T for x in motion)
-        other = model(q, dq, ddq)
-        left = _left_of(tau @ change.T, links, motion[1]) if exchanged else math.inf
-        if other is not None:
-            left = min(left, _left_of(tau, other @ change, motion[1]))
-            left = left if exchanged else min(left, _left_of(tau, other, dq))
-        if left < best:
-            best, found = left, words
-    return found
-
-
-def unlike_links(fit: LinkFit, factor: float, named: bool) -> str:
-    """Return how torques differ from those of the robot's links; `factor` is their unit in SI."""
-    known = factor * fit.gains[np.isfinite(fit.gains)]
-    if not (fit.followed or named):
-        why = "they do not follow from the motion by the robot's own links"
-        return f"{why}: measured joint torques in N m?"
-    if not known.size:
-        return ""
-    off = float(known[np.argmax(np.abs(np.log(np.abs(known))))])
-    most = LINKS.gain if named else LINKS.unnamed_gain
-    if 1.0 / most <= abs(off) <= most:
-        return ""
-    times = f"{off:.3g} times what weight and inertia of the robot's own links ask for at one joint"
-    return f"{times}: a share of a rated torque, or the motor's side?"
-
-
-def _smooth(q: Array, t: Array) -> Motion:
-    """Return values and two derivatives (samples, joints) by local cubics, where no gap is near."""
-    from scipy.signal import savgol_filter
-
-    step = float(np.median(np.diff(t)))
-    width = max(LINKS.fewest, min(round(LINKS.window / step), (len(q) - 1) // 2) | 1)
-    half = width // 2
-    lasts = t[2 * half :] - t[: -2 * half]  # a window over a gap lasts longer
-    some = half + np.flatnonzero(np.abs(lasts - (width - 1) * step) < 0.5 * width * step)
-    some = some[:: max(1, len(some) // LINKS.samples)]
-    q, dq, ddq = (savgol_filter(q, width, 3, deriv=k, delta=step, axis=0)[some] for k in range(3))
-    return q, dq, ddq

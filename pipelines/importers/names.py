@@ -14,8 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from types import MappingProxyType
-from typing import Any, Literal
+from typing import Literal
 
 from pipelines.importers.config import NAMES
 from pipelines.io.sandbox import parse_toml
@@ -54,6 +53,19 @@ class ColumnName:
     unit: str  # named by a part of the name; "" where no part does
 
 
+@dataclass(frozen=True)
+class Vocabulary:
+    """The words of vocabulary.toml, without accents."""
+
+    words: Mapping[str, frozenset[str]]  # quantities, "commanded", "measured", "joint", …
+    sentences: Mapping[str, frozenset[str]]  # "generic", "gear", "plan", "void"
+    messages: tuple[tuple[str, frozenset[str]], ...]  # that define SI units, each by its fields
+    units: Mapping[str, str]  # words within a name that are units: "deg" and "degps"
+    every: frozenset[str]
+    roles: frozenset[str]  # words that are no quantity
+    joined: tuple[str, ...]  # those that may be part of another, long ones first
+
+
 def narrow_signs(text: str) -> str:
     """Return a text with wide letters and signs (Ａ, （, １, 【) as narrow ones in their places."""
     return text.translate(_NARROW)
@@ -68,65 +80,31 @@ def plain_letters(text: str) -> str:
 
 
 @cache
-def _table() -> Mapping[str, Any]:
-    text = files("pipelines.importers").joinpath("vocabulary.toml").read_text("utf-8")
-    return MappingProxyType(parse_toml(text))
-
-
-@cache
-def vocabulary() -> Mapping[str, frozenset[str]]:
-    """Return the words of each meaning: quantities, "commanded", "measured", "joint", …"""
-    words = {meaning: x for meaning, x in _table().items() if isinstance(x, str)}
-    return MappingProxyType({m: frozenset(plain_letters(x).split()) for m, x in words.items()})
-
-
-def spoken(meaning: str) -> frozenset[str]:
-    """Return words of sentences and files: "generic", "gear", "plan", "void"."""
-    return frozenset(_table()["sentences"][meaning].split())
-
-
-def messages() -> list[tuple[str, set[str]]]:
-    """Return messages that define units in SI, each by fields that other messages have not."""
-    known = _table()["messages"].items()
-    return [(name, set(fields.split())) for name, sets in known for fields in sets]
-
-
-@cache
-def all_words() -> frozenset[str]:
-    """Return the words of all meanings."""
-    return frozenset[str]().union(*vocabulary().values())
-
-
-@cache
-def _role_words() -> frozenset[str]:
-    return all_words().difference(*(vocabulary()[quantity] for quantity in QUANTITIES)) | {"d"}
-
-
-@cache
-def _parts_of_words() -> tuple[str, ...]:
-    """Return words that may be part of another, long ones first: of scripts without spaces, …"""
-    found = [
-        word
-        for meaning, words in vocabulary().items()
-        for word in words
-        if not word.isascii()
-        or (meaning not in ("noise", "variant") and (len(word) > NAMES.short or word in _SHORT))
-    ]
-    return tuple(sorted(found, key=len, reverse=True))
-
-
-@cache
-def _suffix_units() -> Mapping[str, str]:
-    """Return the unit of each word that is one within a name: "deg" and "degps" of "pos_deg"."""
-    units = {
-        word: unit
-        for join in ("", "p")
-        for unit in reversed(UNITS)
-        if (word := re.sub("[ ^]", "", unit.lower()).replace("/", join)) not in _NOT_IN_NAMES
-    }
-    return units | {
-        word: unit for unit, words in _table()["units"].items() for word in words.split()
-    }
+def vocabulary() -> Vocabulary:
+    """Return the words that are known, read once."""
+    table = parse_toml(files("pipelines.importers").joinpath("vocabulary.toml").read_text("utf-8"))
+    sentences, messages, named = (table.pop(key) for key in ("sentences", "messages", "units"))
+    words = {meaning: frozenset(plain_letters(x).split()) for meaning, x in table.items()}
+    every = frozenset[str]().union(*words.values())
+    of_quantities = frozenset[str]().union(*(words[quantity] for quantity in QUANTITIES))
+    alone = words["noise"] | words["variant"]
+    parts = {w for w in every if not w.isascii()}
+    parts |= {w for w in every - alone if len(w) > NAMES.short or w in _SHORT}
+    units: dict[str, str] = {}
+    for join in ("", "p"):
+        for unit in reversed(UNITS):
+            word = re.sub("[ ^]", "", unit.lower()).replace("/", join)
+            units |= {} if word in _NOT_IN_NAMES else {word: unit}
+    units |= {word: unit for unit, spelled in named.items() for word in spelled.split()}
+    return Vocabulary(
+        words=words,
+        sentences={kind: frozenset(x.split()) for kind, x in sentences.items()},
+        messages=tuple((name, frozenset(x.split())) for name, y in messages.items() for x in y),
+        units=units,
+        every=every,
+        roles=(every - of_quantities) | {"d"},
+        joined=tuple(sorted(parts, key=lambda word: (-len(word), word))),
+    )
 
 
 def words_of(name: str) -> list[str]:
@@ -153,11 +131,11 @@ def _whole_words(name: str) -> str:
 @cache
 def _parts(word: str) -> tuple[str, ...]:
     """Return the known words that `word` consists of without a rest, else `word` alone."""
-    known = word.isdecimal() or word in all_words() or word in _suffix_units()
-    if known or len(word) > NAMES.longest_word:
+    known = vocabulary()
+    if word.isdecimal() or word in known.every or word in known.units:
         return (word,)
-    joinable = {*_parts_of_words(), *vocabulary()["variant"], "raw"}
-    for first in _parts_of_words():
+    joinable = {*known.joined, *known.words["variant"], "raw"}
+    for first in known.joined if len(word) <= NAMES.longest_word else ():
         if word.startswith(first) and len(word) > len(first):
             rest = _parts(word[len(first) :])
             if joinable.issuperset(rest):
@@ -167,7 +145,7 @@ def _parts(word: str) -> tuple[str, ...]:
 
 def read_name(column: str, unit: str = "") -> ColumnName:
     """Return what a column's name says; `unit` is what the header adds to it."""
-    known, words = vocabulary(), words_of(column)
+    known, words = vocabulary().words, words_of(column)
     held = set(words)
     nouns = [
         (k, quantity)
@@ -186,40 +164,37 @@ def read_name(column: str, unit: str = "") -> ColumnName:
     # A unit in the header is stronger than a word: "temps (s)" is a time, in French.
     by_unit = quantity if quantity == "other" else quantity_of(unit) or quantity
     misused = at is not None and quantity not in (by_unit, "time") and len(words[at]) > 1
-    places = {k for k, _ in nouns if not (misused and words[k] == words[at or 0])}
     unit = unit or named
     quantity = by_unit or quantity_of(unit)
-    moves = quantity in MOTION
+    nouns_at = {k for k, _ in nouns if not (misused and words[k] == words[at or 0])}
+    said = {
+        k
+        for k, word in enumerate(words)
+        if k in nouns_at or word in vocabulary().roles or word in unit_words
+    }
     estimated = bool(held & known["estimated"])  # a drive's motion from its encoder, or a torque
-    now = quantity not in ("", "current") and bool(held & {"current", "cur", "curr"})
-    desired = at is not None and "d" in words[at + 1 :]  # Franka Emika: q_d, tau_J_d
-    origin: Origin = "plain"
-    if held & known["commanded"] or desired or any(word.startswith("soll") for word in words):
-        origin = "commanded"
-    elif (
-        held & known["measured"]
-        or now
-        or (estimated and moves)
-        or any(word.startswith("ist") for word in words)
-    ):
-        origin = "measured"
-    spoken = [
-        k in places or word in _role_words() or word in unit_words for k, word in enumerate(words)
-    ]
     return ColumnName(
         column,
         quantity,
-        origin,
+        _origin(words, quantity, at, estimated),
         # Of two positions, q is the joint's and theta the motor's (Spong 1987, eq. 1).
         motor=bool(held & (known["motor"] | {"theta", "dtheta"})),
-        partial=bool(held & known["partial"]) or (estimated and not moves),
+        partial=bool(held & known["partial"]) or (estimated and quantity not in MOTION),
         filtered=bool(held & known["variant"]),
-        label=tuple(word for word, said in zip(words, spoken, strict=True) if not said),
-        role=tuple(
-            sorted(w for w, said in zip(words, spoken, strict=True) if said and w not in unit_words)
-        ),
+        label=tuple(word for k, word in enumerate(words) if k not in said),
+        role=tuple(sorted(words[k] for k in said if words[k] not in unit_words)),
         unit=unit,
     )
+
+
+def _origin(words: Sequence[str], quantity: str, noun: int | None, estimated: bool) -> Origin:
+    known, held = vocabulary().words, set(words)
+    desired = noun is not None and "d" in words[noun + 1 :]  # Franka Emika: q_d, tau_J_d
+    if held & known["commanded"] or desired or any(word.startswith("soll") for word in words):
+        return "commanded"
+    now = quantity not in ("", "current") and held & {"current", "cur", "curr"}
+    by_word = held & known["measured"] or any(word.startswith("ist") for word in words)
+    return "measured" if by_word or now or (estimated and quantity in MOTION) else "plain"
 
 
 def quantity_of(unit: str) -> str:
@@ -257,7 +232,7 @@ def _unit_in_name(column: str, quantity: str) -> tuple[str, frozenset[str]]:
     pieces = [piece for piece, part in found if 1 < len(piece) < len(part)]
     for piece in (*reversed(parts), *reversed(pieces)):  # mNm before Nm
         word = piece.lower()
-        unit = _suffix_units().get(word, "")
+        unit = vocabulary().units.get(word, "")
         if not unit or (len(parts) + len(pieces) == 1 and quantity != "time") or piece == "a":
             continue
         relative = unit in ("%", "‰", "LSB")  # of a rated value that only the drive knows

@@ -15,14 +15,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from pipelines.importers.config import NOTES
-from pipelines.importers.names import (
-    narrow_signs,
-    plain_letters,
-    read_name,
-    spoken,
-    vocabulary,
-    words_of,
-)
+from pipelines.importers.names import narrow_signs, plain_letters, read_name, vocabulary, words_of
 from pipelines.io.units import UNITS, canonical_unit
 
 _NUMBER = r"(?<![\w.,:])([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)(?![\d:])"
@@ -151,13 +144,21 @@ def stated_unit(
     found: dict[str, str] = {}
     for clause in _clauses(notes):
         words = _words(clause)
-        if words & spoken("void") or (words & vocabulary()["other"]) - {"data"}:
+        if words & vocabulary().sentences["void"] or (words & vocabulary().words["other"]) - {
+            "data"
+        }:
             continue
-        if words & (vocabulary()["temperature"] | spoken("gear")):
+        if words & (vocabulary().words["temperature"] | vocabulary().sentences["gear"]):
             continue
-        ordered = words & vocabulary()["commanded"] and not words & vocabulary()["measured"]
-        of_motor = words & vocabulary()["motor"] and not words & vocabulary()["joint"] and not motor
-        if ordered or of_motor or (quantity == "torque" and words & vocabulary()["partial"]):
+        ordered = (
+            words & vocabulary().words["commanded"] and not words & vocabulary().words["measured"]
+        )
+        of_motor = (
+            words & vocabulary().words["motor"]
+            and not words & vocabulary().words["joint"]
+            and not motor
+        )
+        if ordered or of_motor or (quantity == "torque" and words & vocabulary().words["partial"]):
             continue
         if _SI.search(plain_letters(clause).lower()) and quantity in _SI_UNITS and not linear:
             found.setdefault(_SI_UNITS[quantity], clause)
@@ -165,7 +166,9 @@ def stated_unit(
             if UNITS[unit].quantity != quantity:
                 continue
             beside = {word for word in _words(before) if not word.isdecimal()}
-            generic = beside <= spoken("generic") | vocabulary()["joint"] | {unit.lower()}
+            generic = beside <= vocabulary().sentences["generic"] | vocabulary().words["joint"] | {
+                unit.lower()
+            }
             fits = quantity != "position" or linear == (unit in ("m", "cm", "mm", "um"))
             if fits and (generic or read_name(before).quantity == quantity):
                 found.setdefault(canonical_unit(unit), clause)
@@ -230,12 +233,16 @@ def stated_of_some_joints(notes: Sequence[str], n: int) -> list[str]:
 
     A person must read them.
     """
-    of_joint, found = (vocabulary()["joint"] | {"q"}) - {"a"}, []
+    of_joint, found = (vocabulary().words["joint"] | {"q"}) - {"a"}, []
     for clause in _clauses(notes):
         words = words_of(clause[: NOTES.longest])
         pairs = itertools.pairwise(words)
         numbers = {number for word, number in pairs if word in of_joint and number.isdecimal()}
-        more = {word for word in words if not word.isdecimal()} - of_joint - vocabulary()["noise"]
+        more = (
+            {word for word in words if not word.isdecimal()}
+            - of_joint
+            - vocabulary().words["noise"]
+        )
         if 0 < len(numbers) < n and len(more) >= NOTES.fewest_words and not any(_units(clause)):
             found.append(clause.strip(_AROUND)[: NOTES.longest])
     return found
@@ -275,7 +282,7 @@ def stated_gear(notes: Sequence[str]) -> Statement | None:
     found: dict[float, str] = {}
     for note in notes:
         line = note[: NOTES.longest]
-        if _words(line) & spoken("gear"):
+        if _words(line) & vocabulary().sentences["gear"]:
             ratios = [max(map(_number, pair)) for pair in _RATIO.findall(line)]
             for ratio in ratios or map(_number, re.findall(_NUMBER, line)):
                 found.setdefault(ratio, note.strip(_AROUND)[: NOTES.longest])

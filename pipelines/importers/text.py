@@ -32,7 +32,7 @@ from pipelines.importers.header import (
     labelled_lines,
     names_and_units,
 )
-from pipelines.importers.names import all_words, words_of
+from pipelines.importers.names import vocabulary, words_of
 from pipelines.importers.raw import RawTable
 from pipelines.importers.recipe import TextFormat
 from pipelines.io.limits import FEWEST
@@ -169,7 +169,7 @@ def _encoding_of(data: bytes) -> str:
         data.decode("utf-8")
     except UnicodeDecodeError:  # by how many words that name columns it has
         words = {e: words_of(head.decode(e, "ignore")) for e in _ENCODINGS}
-        return max(_ENCODINGS, key=lambda e: sum(word in all_words() for word in words[e]))
+        return max(_ENCODINGS, key=lambda e: sum(word in vocabulary().every for word in words[e]))
     return "utf-8"
 
 

@@ -8,6 +8,7 @@ give the order, and names without numbers leave the order of the file.
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
@@ -20,10 +21,12 @@ from pipelines.io.units import canonical_unit
 
 _GENERIC = frozenset({"joint", "joints", "jnt", "axis", "link"})
 _JOINT_SIDE = _GENERIC | {"jnts", "axes", "achse", "gelenk", "j", "a", "q", "qpos", "jpos"}
-_LEARNING = {"observation", "action", "norm", "normalized", "normalised", "scaled"}
+_LEARNING = frozenset(
+    {"observation", "action", "norm", "normalized", "normalised", "scaled"}
+)  # of robot learning
 _NAME = re.compile(r"[\w./:-]+")
 Order = Literal["robot", "numbers", "file", "text"]
-Side = Literal["joint", "motor", "scaled", ""]
+Member = tuple[ColumnName, int | None]  # a column and its joint (from 0), where it is known
 
 
 @dataclass(frozen=True)
@@ -42,35 +45,13 @@ class Group:
     gripper: tuple[str, ...] = ()  # columns left out: the file's list of names calls them so
 
     @property
-    def side(self) -> Side:
-        """Return the side of the gear by name: q is a joint's; robot learning may scale it."""
-        if _LEARNING & set(self.words.split()):
-            return "scaled"
-        return "motor" if self.motor else "joint" if self.names_joints else ""
+    def scaled(self) -> bool:
+        """Return whether robot learning may have scaled it."""
+        return bool(_LEARNING & set(self.words.split()))
 
     @property
     def names_joints(self) -> bool:
         return self.order == "robot" or bool(set(self.words.split()) & _JOINT_SIDE)
-
-    @property
-    def rank(self) -> tuple[int, bool, bool]:
-        """Order of preference: measured, plain, commanded; joint, motor; raw, filtered."""
-        return (("measured", "plain", "commanded").index(self.origin), self.motor, self.filtered)
-
-
-@dataclass(frozen=True)
-class Choice:
-    """The group taken for a signal, None where the names leave it open; and the others of it."""
-
-    group: Group | None
-    others: tuple[Group, ...] = ()
-
-    @property
-    def left_open(self) -> Choice:
-        return Choice(None, (*((self.group,) if self.group else ()), *self.others))
-
-
-Member = tuple[ColumnName, int | None]  # a column and its joint (from 0), where it is known
 
 
 def groups_of(table: RawTable, joints: Sequence[str] = (), slides: bool = False) -> list[Group]:
@@ -82,7 +63,7 @@ def groups_of(table: RawTable, joints: Sequence[str] = (), slides: bool = False)
     shared = _shared_path(table)
     ports = {column.rpartition("/")[2] for column in table.columns if "/" in column}
     port = f"/{ports.pop()}" if len(ports) == 1 else ""  # the "Out1" of dSPACE's blocks
-    kinds: dict[tuple[object, ...], list[Member]] = {}
+    kinds: dict[tuple[object, ...], list[Member]] = defaultdict(list)
     for column in table.columns:
         rest, place = column.removeprefix(shared).removesuffix(port), None
         for k in sorted(range(len(patterns)), key=lambda k: -len(patterns[k].pattern)):
@@ -94,8 +75,8 @@ def groups_of(table: RawTable, joints: Sequence[str] = (), slides: bool = False)
         name = replace(read_name(rest, canonical_unit(table.units.get(column, ""))), column=column)
         place = _place_by_words(name.label, joints) if place is None else place
         key = (name.quantity, name.origin, name.motor, name.partial, name.filtered, name.role)
-        kinds.setdefault(key, []).append((name, place))
-    groups, texts = [], texts_of(table, joints)
+        kinds[key].append((name, place))
+    texts, groups = listed_joints(table, joints), []
     for part in (part for members in kinds.values() for part in _split(members, len(joints))):
         if {"x", "y", "z"} <= {name.column.removeprefix(shared).lower() for name, _ in part}:
             part = [(replace(name, quantity="other"), place) for name, place in part]  # a pose
@@ -124,23 +105,20 @@ def _shared_path(table: RawTable) -> str:
 
 
 def _patterns(table: RawTable, joints: Sequence[str]) -> list[re.Pattern[str]]:
-    """Return a pattern for each joint's name, with or without words such as "joint".
+    """Return a pattern for each joint's name, without words such as "joint" if that is enough.
 
     All of the robot's names, or none: columns joint_0, joint_1, … do not name joint_1, joint_2, …
     """
-    for generic in (frozenset[str](), _GENERIC):
-        every = [re.findall(r"\d+|[A-Z]?[a-z]+|[A-Z]+", name) for name in joints]
-        names = [[word for word in words if word.lower() not in generic] for words in every]
-        if any(
-            len("".join(words)) <= NAMES.short or not any(map(str.isalpha, words))
-            for words in names
-        ):
+    every = [re.findall(r"\d+|[A-Z]?[a-z]+|[A-Z]+", name) for name in joints]
+    bare = [[word for word in words if word.lower() not in _GENERIC] for words in every]
+    for names in (every, bare):
+        plain = (len("".join(w)) > NAMES.short and any(map(str.isalpha, w)) for w in names)
+        if not joints or not all(plain):
             continue
         bodies = ["[^A-Za-z0-9]?".join(words) for words in names]
-        found = [
-            re.compile(rf"(?<![A-Za-z0-9]){body}(?![A-Za-z0-9])", re.IGNORECASE) for body in bodies
-        ]
-        if found and all(any(pattern.search(c) for c in table.columns) for pattern in found):
+        whole = (rf"(?<![A-Za-z0-9]){body}(?![A-Za-z0-9])" for body in bodies)
+        found = [re.compile(pattern, re.IGNORECASE) for pattern in whole]
+        if all(any(pattern.search(c) for c in table.columns) for pattern in found):
             return found
     return []
 
@@ -151,36 +129,37 @@ def _place_by_words(label: Sequence[str], joints: Sequence[str]) -> int | None:
         return None
     bare = [[word for word in words_of(name) if word not in _GENERIC] for name in joints]
     common = set(bare[0]).intersection(*bare[1:]) if len(bare) > 1 else set()
-    wanted = [word for word in label if word not in common]
-    own = [[word for word in words if word not in common] for words in bare]
-    matches = [k for k, words in enumerate(bare) if words and own[k] == wanted]
+    wanted, *own = ([word for word in words if word not in common] for words in (label, *bare))
+    matches = [k for k, words in enumerate(own) if bare[k] and words == wanted]
     return matches[0] if len(matches) == 1 else None
 
 
-def texts_of(table: RawTable, joints: Sequence[str]) -> tuple[str, ...]:
+def listed_joints(table: RawTable, joints: Sequence[str]) -> tuple[str, ...]:
     """Return the joints that columns of text name, in the order of the file.
 
-    They are in columns of their own (name[0] is "elbow_joint") or in one ("['elbow', …]").
+    They are in a note, in one column ("['elbow', …]") or in columns of their own (name[0] is
+    "elbow_joint"). Without a robot, any different words will do.
     """
-    for note in table.notes if joints else ():
-        words = _NAME.findall(note)
-        if set(joints) <= set(words):
-            return tuple(word for word in words if word in joints)
     texts = list(table.labels.values())
-    for text in (text for text in texts if text.strip()[:1] in ("[", "(")):
-        words = _NAME.findall(text)
-        named = set(joints) <= set(words) or not joints
-        if len(words) > 1 and named and not any(word[0].isdecimal() for word in words):
-            return tuple(words)
-    known = [k for k, text in enumerate(texts) if text in joints]
-    if known:
-        return tuple(texts[known[0] : known[-1] + 1])
-    families: dict[tuple[str, ...], list[str]] = {}
+    cells = [_NAME.findall(text) for text in texts if text.strip()[:1] in ("[", "(")]
+    families: dict[tuple[str, ...], list[str]] = defaultdict(list)
     for column, text in table.labels.items():
-        stem = tuple(word for word in words_of(column) if not word.isdecimal())
-        families.setdefault(stem, []).append(text)
-    found = max(families.values(), key=len, default=[])
-    return tuple(found) if len(set(found)) == len(found) > 1 else ()
+        families[tuple(word for word in words_of(column) if not word.isdecimal())].append(text)
+    family = max(families.values(), key=len, default=[])
+    if joints:
+        notes = (_NAME.findall(note) for note in table.notes)
+        known = [[word for word in words if word in joints] for words in notes]
+        for words in (*known, *cells):
+            if set(joints) <= set(words):
+                return tuple(words)
+        places = [k for k, text in enumerate(texts) if text in joints]
+        if places:
+            return tuple(texts[places[0] : places[-1] + 1])
+    else:
+        words = [w for w in cells if w[1:] and not any(x[0].isdecimal() for x in w)]
+        if words:
+            return tuple(words[0])
+    return tuple(family) if len(set(family)) == len(family) > 1 else ()
 
 
 def by_texts(
@@ -193,7 +172,7 @@ def by_texts(
     if len(texts) != len(columns) or len(texts) == 1:
         return list(columns), None
     if joints and set(joints) <= set(texts):
-        return [columns[list(texts).index(joint)] for joint in joints], "robot"
+        return [columns[texts.index(joint)] for joint in joints], "robot"
     numbers = [_number(words_of(text)) for text in texts]
     rising = None not in numbers and numbers == sorted(numbers, key=lambda number: number or 0)
     return list(columns), None if rising else "text"
@@ -213,25 +192,22 @@ def _split(members: list[Member], n: int) -> list[list[Member]]:
     places = [place for _, place in members if place is not None]
     if places and len(set(places)) == len(places):
         return [members]
-    parts: dict[tuple[str, ...], list[Member]] = {}
+    parts: dict[tuple[str, ...], list[Member]] = defaultdict(list)
     for member in members:
-        words = tuple("#" if word.isdecimal() else word for word in member[0].label)
-        parts.setdefault(words, []).append(member)
+        parts[tuple("#" if w.isdecimal() else w for w in member[0].label)].append(member)
     found = [part for alike in parts.values() for part in _by_number(alike, n)]
     if all(len(part) > 1 for part in found):
         return found
     whole = [part for part in found if len(part) == n > 1]
-    rest = [member for member in members if not any(member in part for part in whole)]
-    return [*whole, rest]
+    return [*whole, [member for member in members if not any(member in part for part in whole)]]
 
 
 def _by_number(members: list[Member], n: int) -> list[list[Member]]:
     """Split columns by a number that does not count from 0 or 1, as joints do: J1.6064h."""
-    labels = [name.label for name, _ in members]
-    for at in range(len(labels[0]) if len(members) > n > 1 else 0):
-        parts: dict[str, list[Member]] = {}
-        for label, member in zip(labels, members, strict=True):
-            parts.setdefault(label[at].lstrip("0"), []).append(member)
+    for at in range(len(members[0][0].label) if len(members) > n > 1 else 0):
+        parts: dict[str, list[Member]] = defaultdict(list)
+        for member in members:
+            parts[member[0].label[at].lstrip("0")].append(member)
         counted = set(parts) <= {"", *map(str, range(len(parts) + 1))}
         if not counted and all(len(part) == n for part in parts.values()):
             return list(parts.values())
@@ -240,22 +216,20 @@ def _by_number(members: list[Member], n: int) -> list[list[Member]]:
 
 def _ordered(members: list[Member], joints: Sequence[str], texts: Sequence[str]) -> Group:
     """Return the group with its columns from the base to the tip, as far as that can be known."""
-    names = [name for name, _ in members]
-    places = [place for _, place in members]
+    names, places = [name for name, _ in members], [place for _, place in members]
     numbers = [_number(name.label) for name in names]
     order: Order = "file"
     if joints and sorted(p for p in places if p is not None) == list(range(len(joints))):
         names, order = [names[places.index(place)] for place in range(len(joints))], "robot"
     elif {*places} == {None} and None not in numbers and len(set(numbers)) == len(numbers):
-        ranked = sorted(zip(numbers, names, strict=True), key=lambda pair: pair[0] or 0)
-        names, order = [name for _, name in ranked], "numbers"
+        names, order = sorted(names, key=lambda name: _number(name.label) or 0), "numbers"
     columns = [name.column for name in names]
     if order != "robot":
         columns, by_text = by_texts(columns, texts, joints)
         order = by_text or order
-    first = names[0]
     said = [{w for w in name.label if w.isalpha() and (w[1:] or not w.isascii())} for name in names]
     unknown = frozenset(said[0].intersection(*said[1:])) if len(names) > 1 else frozenset()
+    first = names[0]
     words = " ".join(first.role) or " ".join(first.label)
     kind = first.quantity, first.origin, first.motor, first.partial, first.filtered
     return Group(*kind, tuple(columns), order, words, unknown)
@@ -266,36 +240,11 @@ def _number(label: Sequence[str]) -> int | None:
     return int(numbers[-1][:9]) if numbers else None
 
 
-def choose(
-    groups: Sequence[Group], quantities: Sequence[str], n: int | None, commanded: bool
-) -> Choice:
-    """Return the group that holds a signal of one of `quantities`, the earlier ones preferred.
-
-    Args:
-        n: number of joints; None where it is not known.
-        commanded: whether a commanded one will do where no other is there.
-    """
-    every = [g for g in groups if g.quantity in quantities]
-    fitting = [g for g in every if not g.partial and (commanded or g.origin != "commanded")]
-    others = [g for g in every if g not in fitting]
-
-    def key(group: Group) -> tuple[object, ...]:
-        place = quantities.index(group.quantity)
-        return (group.origin == "commanded", group.order != "robot", place, group.rank)
-
-    sized = sorted((g for g in fitting if n is None or len(g.columns) == n), key=key)
-    best = [g for g in sized if key(g) == key(sized[0])]
-    rest = tuple(g for g in (*fitting, *others) if g not in best)
-    return Choice(best[0], rest) if len(best) == 1 else Choice(None, (*best, *rest))
-
-
-def unit_of_group(columns: Sequence[str], table: RawTable) -> tuple[str | None, ...]:
+def own_units(columns: Sequence[str], table: RawTable) -> list[str | None]:
     """Return the unit of each column as the header or its name says it; None where neither does.
 
     It may be one that `UNITS` does not have, such as "%".
     """
     headers = [canonical_unit(table.units.get(column, "")).strip() for column in columns]
-    return tuple(
-        header if header not in ("", "-", "1") else read_name(column).unit or None
-        for header, column in zip(headers, columns, strict=True)
-    )
+    pairs = zip(headers, columns, strict=True)
+    return [h if h not in ("", "-", "1") else read_name(c).unit or None for h, c in pairs]
