@@ -10,7 +10,7 @@ from __future__ import annotations
 import sys
 import types
 import typing
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import Field, dataclass, fields
 from importlib import import_module
 from importlib.util import find_spec
@@ -22,7 +22,7 @@ import typer
 
 from pipelines.errors import UsageError, clean, did_you_mean
 from pipelines.io.option import option
-from pipelines.io.sandbox import TomlError, parse_toml
+from pipelines.io.sandbox import TomlError, parse_toml, read_small_text
 
 __all__ = ["Common", "make_settings", "parameters", "read", "read_values", "settable", "stage_of"]
 
@@ -61,11 +61,10 @@ class Common:
 
     def __post_init__(self) -> None:
         if self.quiet and self.verbose:
-            message, where = "-q and -v contradict each other", "-q, -v"
-            raise UsageError("C02", message, where=where, remedy="give one of them")
+            raise UsageError("C02", "-q and -v contradict each other", "-q, -v", "give one of them")
         if self.format not in ("h5", "parquet"):
             message = f"'{self.format}' is no container"
-            raise UsageError("C02", message, where="--format", remedy="give h5 or parquet")
+            raise UsageError("C02", message, "--format", "give h5 or parquet")
 
 
 def module_of(command: str) -> str:
@@ -151,7 +150,7 @@ def read_values(kind: type[Any], given: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
         UsageError: C02, no number where the option takes one.
     """
-    hints, found = typing.get_type_hints(kind), {}
+    hints, found = typing.get_type_hints(kind), dict[str, Any]()
     for field in fields(kind):
         value = given.get(_key(kind, field))
         if "help" not in field.metadata or value is None:
@@ -160,41 +159,40 @@ def read_values(kind: type[Any], given: Mapping[str, Any]) -> dict[str, Any]:
         flag = _flags(field)[0]
         if wanted is bool:
             found[field.name] = value if "/" in flag else not field.default
-        elif many and wanted in EXAMPLES:
-            text = ",".join(value)
-            found[field.name] = tuple(_number(wanted, part, flag, text) for part in text.split(","))
+        elif wanted in EXAMPLES and many:
+            found[field.name] = _numbers(wanted, ",".join(value), flag, many)
         elif wanted in EXAMPLES:
-            found[field.name] = _number(wanted, value, flag, "")
+            found[field.name] = _numbers(wanted, value, flag, many)[0]
         else:
             found[field.name] = tuple(map(wanted, value)) if many else wanted(value)
     return found
 
 
-def _number(kind: type[Any], text: str, flag: str, listed: str) -> Any:
-    """Return a number of the command line, one of `listed` where there may be several."""
+def _numbers(kind: type[Any], text: str, flag: str, many: bool) -> tuple[Any, ...]:
+    """Return the numbers of an option: one, or several with commas between them."""
     try:
-        value = kind(text)
-        if kind is float or abs(value) < 1 << 63:
-            return value
+        values = tuple(map(kind, text.split(",") if many else [text]))
+        if kind is float or all(abs(value) < 1 << 63 for value in values):
+            return values
     except ValueError:
         pass
     name, one, several = EXAMPLES[kind]
     message, remedy = f"'{clean(text, 60)}' is no {name}", f"give a {name}, such as {one}"
-    if listed:
-        message = f"'{clean(listed, 60)}' is no list of {name}s"
+    if many:
+        message = f"'{clean(text, 60)}' is no list of {name}s"
         remedy = f"write for example {several}"
-    raise UsageError("C02", message, where=flag, remedy=remedy)
+    raise UsageError("C02", message, flag, remedy)
 
 
 def settable(command: str) -> dict[str, list[str]]:
     """Return what --set takes for a command: stage -> names; for `run` those of all its stages."""
     if command != "run":
         return {command: _names(stage_of(command).settings)}
-    found = {}
-    for stage in _run_stages():
-        kind = stage_of(stage).settings
-        found[stage] = [name for name in _names(kind) if not _is_own(kind, name)]
-    return found
+    kinds = {stage: stage_of(stage).settings for stage in _run_stages()}
+    return {
+        stage: [name for name in _names(kind) if not _is_own(kind, name)]
+        for stage, kind in kinds.items()
+    }
 
 
 def _names(kind: type[Any]) -> list[str]:
@@ -227,19 +225,19 @@ def make_settings(
             no such file.
     """
     chosen: dict[str, dict[str, Any]] = {stage: {}}
-    for where, name, options in (*_from_file(config), *_from_sets(sets)):
+    for where, name, options in (*_from_file(config), *map(_from_set, sets)):
         if name not in STAGES:
             message = f"'{name}' is no stage{did_you_mean(name, STAGES)}"
-            raise UsageError("C01", message, where=where, remedy="write STAGE.OPTION")
+            raise UsageError("C01", message, where, "write STAGE.OPTION")
         if not isinstance(options, Mapping):
-            message, remedy = f"'{name}' is a stage, not an option", f"write a table [{name}]"
-            raise UsageError("C01", message, where=where, remedy=remedy)
+            message = f"'{name}' is a stage, not an option"
+            raise UsageError("C01", message, where, f"write a table [{name}]")
         owner = stage_of(name).settings
         for key, value in options.items():
             if stage == "run" and name in _run_stages() and _is_own(owner, key):
                 message = f"{name}.{key} has no place in a run, whose stages share logs and models"
                 remedy = f"give it to rrrid {name}; run takes --identify, --validate, --reference"
-                raise UsageError("C02", message, where=where, remedy=remedy)
+                raise UsageError("C02", message, where, remedy)
             value = _value(owner, key, value, f"{where}, {name}.{key}")
             chosen.setdefault(name, {})[key] = value
     own = chosen.pop(stage) | dict(given)
@@ -248,35 +246,30 @@ def make_settings(
     return stage_of(stage).settings(**own)
 
 
-def _from_file(path: Path | None) -> Iterator[tuple[str, str, Any]]:
-    """Yield (where, stage, options) of a TOML file."""
+def _from_file(path: Path | None) -> list[tuple[str, str, Any]]:
+    """Return (where, stage, options) of each table of a TOML file."""
     if path is None:
-        return
-    from pipelines.io.sandbox import read_small_text
-
-    text = read_small_text(path, what="a TOML file of settings")
+        return []
     try:
-        tables = parse_toml(text)
+        tables = parse_toml(read_small_text(path, what="a TOML file of settings"))
     except TomlError as problem:
         remedy = "settings are TOML; YAML is not read"
-        raise UsageError("C03", f"not valid TOML: {problem}", where=path, remedy=remedy) from None
-    for stage, options in tables.items():
-        yield str(path), stage, options
+        raise UsageError("C03", f"not valid TOML: {problem}", path, remedy) from None
+    return [(str(path), stage, options) for stage, options in tables.items()]
 
 
-def _from_sets(sets: Iterable[str]) -> Iterator[tuple[str, str, Any]]:
-    """Yield (where, stage, options) of each STAGE.OPTION=VALUE."""
-    for text in sets:
-        name, equals, value = text.partition("=")
-        stage, dot, key = name.strip().partition(".")
-        if not (equals and dot and key):
-            message, remedy = f"'{text}' is not STAGE.OPTION=VALUE", "write convert.to=csv, say"
-            raise UsageError("C01", message, where="--set", remedy=remedy)
-        try:
-            parsed = parse_toml(f"x = {value}")["x"]
-        except TomlError:
-            parsed = value.strip()  # a bare word is a text
-        yield "--set", stage, {key: parsed}
+def _from_set(text: str) -> tuple[str, str, Any]:
+    """Return (where, stage, options) of STAGE.OPTION=VALUE."""
+    name, equals, value = text.partition("=")
+    stage, dot, key = name.strip().partition(".")
+    if not (equals and dot and key):
+        message = f"'{text}' is not STAGE.OPTION=VALUE"
+        raise UsageError("C01", message, "--set", "write convert.to=csv, say")
+    try:
+        parsed = parse_toml(f"x = {value}")["x"]
+    except TomlError:
+        parsed = value.strip()  # a bare word is a text
+    return "--set", stage, {key: parsed}
 
 
 def _value(kind: type[Any], name: str, value: Any, where: str) -> Any:
@@ -285,16 +278,15 @@ def _value(kind: type[Any], name: str, value: Any, where: str) -> Any:
     if name not in known:
         message = f"no such option{did_you_mean(name, known)}"
         there = ", ".join(known) or "none"
-        raise UsageError("C01", message, where=where, remedy=f"there are: {there}")
+        raise UsageError("C01", message, where, f"there are: {there}")
     wanted, many = _kind(typing.get_type_hints(kind)[name])
-    listed = [value] if many and isinstance(value, str) else value  # a text: a list of one
-    if many and isinstance(listed, list) and all(_fits(wanted, item) for item in listed):
-        return tuple(map(wanted, listed))
-    if not many and _fits(wanted, value):
-        return wanted(value)
+    values = value if many and isinstance(value, list) else [value]
+    listed = not many or isinstance(value, list | str)  # a text: a list of one
+    if listed and all(_fits(wanted, item) for item in values):
+        return tuple(map(wanted, values)) if many else wanted(value)
     what = "a list" if many else KINDS.get(wanted, f"a {wanted.__name__}")
     message = f"{clean(repr(value), 60)} is not {what}"
-    raise UsageError("C02", message, where=where, remedy="correct the value")
+    raise UsageError("C02", message, where, "correct the value")
 
 
 def _fits(kind: type[Any], value: Any) -> bool:
