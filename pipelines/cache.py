@@ -104,20 +104,24 @@ def libraries(*names: str) -> dict[str, str]:
 def changes(old: Key, new: Key, most: int = 3) -> str:
     """Say what differs, in the first group where something does."""
     for group, now in new.items():
-        before, told = old.get(group, {}), []
+        before = old.get(group, {})
+        words = _ALTERED.get(group, "{name} has other content")
+        told = []
         for name in dict.fromkeys((*now, *sorted(before))):
             if name not in before:
                 told.append(f"new {group} {name}")
             elif name not in now:
                 told.append(f"{group} gone: {name}")
             elif before[name] != now[name]:
-                values = (json.dumps(v, ensure_ascii=False) for v in (before[name], now[name]))
-                was, is_ = (clean("unset" if value == "null" else value, 40) for value in values)
-                words = _ALTERED.get(group, "{name} has other content")
+                was, is_ = _in_words(before[name]), _in_words(now[name])
                 told.append(words.format(name=name, old=was, new=is_))
         if told:
             return "; ".join(told[:most]) + (f" and {len(told) - most} more" * (len(told) > most))
     return "its key is another"
+
+
+def _in_words(value: Any) -> str:
+    return "unset" if value is None else clean(json.dumps(value, ensure_ascii=False), 40)
 
 
 @contextlib.contextmanager
@@ -165,19 +169,14 @@ class Entry:
         return object_, read_series(series) if series.is_file() else {}
 
     def put(self, folder: Path) -> None:
-        """Put it into an output that is being made."""
+        """Put it into an output that is being made, by second names of its files or copies."""
         for name in (*self.about["files"], f"{CACHE}/{self.stage}/entry.json"):
-            link(self.root / name, folder / name)
-
-
-def link(source: Path, target: Path) -> None:
-    """Give a file a second name, or copy it where the file system has no such names."""
-    with environment_faults(target):
-        target.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            os.link(source, target)
-        except OSError:
-            shutil.copyfile(source, target)
+            with environment_faults(folder / name):
+                (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                try:
+                    os.link(self.root / name, folder / name)
+                except OSError:  # a file system without such names
+                    shutil.copyfile(self.root / name, folder / name)
 
 
 class Store:
@@ -200,8 +199,8 @@ class Store:
                 continue
             if key is not None and about["digest"] != digest_of_json(key):
                 why = changes(about["key"], key)
-            elif damaged := _damage(root, about["files"]):
-                why = f"what is stored is damaged: {damaged}"
+            elif damaged := [n for n, sha in about["files"].items() if not _is_whole(root, n, sha)]:
+                why = f"what is stored is damaged: {damaged[0]}"
             else:
                 return Entry(root, stage, about)
         return why
@@ -231,12 +230,9 @@ class Store:
                 (folder / "result.json").write_text(json_text(result[0]), encoding="utf-8")
             if result is not None and result[1]:
                 write_series(folder / "result.h5", result[1])
-            files = {
-                path.relative_to(root).as_posix(): hash_file(path)
-                for place in (folder, root / stage)
-                for path in sorted(place.rglob("*"))
-                if path.is_file()
-            }
+            paths = [*sorted(folder.rglob("*")), *sorted((root / stage).rglob("*"))]
+            names = [path.relative_to(root).as_posix() for path in paths if path.is_file()]
+            files = {name: hash_file(root / name) for name in names}
             told, _ = encode({**about, "key": key, "digest": digest_of_json(key), "files": files})
             text = json_text({"about": told, "sha256": digest_of_json(told)})
             (folder / "entry.json").write_text(text, encoding="utf-8")
@@ -259,22 +255,17 @@ class Store:
 def _about(root: Path, stage: str) -> dict[str, Any] | None:
     """Return the content of entry.json; None if it is missing or damaged."""
     try:
-        text = (root / CACHE / stage / "entry.json").read_text(encoding="utf-8")
-        about: dict[str, Any] = json.loads(text)["about"]
-        return about if json.loads(text)["sha256"] == digest_of_json(about) else None
+        entry = json.loads((root / CACHE / stage / "entry.json").read_text(encoding="utf-8"))
+        about: dict[str, Any] = entry["about"]
+        return about if entry["sha256"] == digest_of_json(about) else None
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
 
-def _damage(root: Path, files: Mapping[str, str]) -> str:
-    """Return the first file that is missing or not what the entry says; "" where all are."""
-    for name, sha256 in files.items():
-        path = root / name
-        if ".." in PurePath(name).parts or path.is_symlink() or not path.is_file():
-            return name
-        if hash_file(path) != sha256:
-            return name
-    return ""
+def _is_whole(root: Path, name: str, sha256: str) -> bool:
+    path = root / name
+    inside = ".." not in PurePath(name).parts and not path.is_symlink()
+    return inside and path.is_file() and hash_file(path) == sha256
 
 
 def drawing_digest(modules: Iterable[str], sources: Sources) -> str:

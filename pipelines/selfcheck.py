@@ -13,13 +13,16 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from pipelines import __version__
 from pipelines.errors import RrridError, clean
-from pipelines.io.files import open_log, write_log
+from pipelines.io.files import Opened, open_log, write_log
+from pipelines.io.output import tilde
 from pipelines.io.processors import processors
+from pipelines.io.sessions import Inputs
 
 if TYPE_CHECKING:
     from packaging.requirements import Requirement
@@ -45,20 +48,16 @@ class Finding:
 
 def examine(with_self_test: bool = True) -> Iterator[Finding]:
     """Yield every finding; the self-test, which takes some seconds, comes last."""
-    system = platform.system()
-    level: Level = "ok" if system == "Linux" else "warn"
-    remedy = "rrrid is tested on Linux alone" if level == "warn" else ""
-    found = f"{platform.python_version()} ({system} {platform.machine()})"
-    yield Finding("Python", level, found, remedy)
-    place = _tilde(Path(__file__).resolve().parents[1])
-    yield Finding("rrrid", "ok", f"{__version__} in {place}")
+    linux = platform.system() == "Linux"
+    found = f"{platform.python_version()} ({platform.system()} {platform.machine()})"
+    yield Finding(
+        "Python", "ok" if linux else "warn", found, "rrrid is tested on Linux alone" * (not linux)
+    )
+    yield Finding("rrrid", "ok", f"{__version__} in {tilde(Path(__file__).resolve().parents[1])}")
     yield from _libraries()
     many = [f"{name}={os.environ[name]}" for name in _THREADS if os.environ.get(name, "1") != "1"]
-    if many:
-        remedy = "one thread is the fastest here: unset them, rrrid sets 1 itself"
-        yield Finding("BLAS", "warn", ", ".join(many), remedy)
-    else:
-        yield Finding("BLAS", "ok", "one thread")
+    remedy = "one thread is the fastest here: unset them, rrrid sets 1 itself" if many else ""
+    yield Finding("BLAS", "warn" if many else "ok", ", ".join(many) or "one thread", remedy)
     usable = f"{processors()} of {os.cpu_count()} cores may be used"
     yield Finding("processor", "ok", f"{usable}; rrrid batch takes them all")
     remedy = "set TMPDIR to a folder that can be written"
@@ -82,60 +81,56 @@ def _libraries() -> Iterator[Finding]:
         yield Finding("libraries", "warn", found, "pip install -e .")
         return
     for wanted in map(Requirement, lines):
-        for extra in ("", "bench", "cluster"):
-            if wanted.marker is None or wanted.marker.evaluate({"extra": extra}):
-                yield _library(wanted, extra)
-                break
+        extras = [
+            extra
+            for extra in ("", "bench", "cluster")
+            if wanted.marker is None or wanted.marker.evaluate({"extra": extra})
+        ]
+        if extras:
+            yield _library(wanted, extras[0])
 
 
 def _library(wanted: Requirement, extra: str) -> Finding:
-    missing: Level = "ok" if extra else "bad"
     remedy = f"pip install --upgrade '{f'rrrid[{extra}]' if extra else wanted}'"
-    asked = f"{wanted.specifier} is required{f' by the extra {extra}' if extra else ''}"
+    required = f"{wanted.specifier} is required{f' by the extra {extra}' if extra else ''}"
     try:
         version = importlib.metadata.version(wanted.name)
     except importlib.metadata.PackageNotFoundError:
-        return Finding(wanted.name, missing, f"not installed, {asked}", remedy)
+        level: Level = "ok" if extra else "bad"
+        return Finding(wanted.name, level, f"not installed, {required}", remedy)
     if wanted.specifier.contains(version, prereleases=True):
         return Finding(wanted.name, "ok", version)
-    return Finding(wanted.name, "warn" if extra else "bad", f"{version}, {asked}", remedy)
+    return Finding(wanted.name, "warn" if extra else "bad", f"{version}, {required}", remedy)
 
 
 def _folder(name: str, where: Callable[[], Path], otherwise: Level, remedy: str) -> Finding:
     try:
         path = where()
         with tempfile.NamedTemporaryFile(dir=path, prefix=".rrrid-doctor-"):
-            return Finding(name, "ok", f"{_tilde(path)} can be written")
+            return Finding(name, "ok", f"{tilde(path)} can be written")
     except (OSError, RuntimeError) as problem:
         return Finding(name, otherwise, f"cannot be written: {clean(problem, 100)}", remedy)
-
-
-def _tilde(path: Path) -> str:
-    home = os.path.expanduser("~")
-    return str(path).replace(home, "~") if len(home) > 1 else str(path)
 
 
 def self_test() -> Iterator[Finding]:
     """Simulate a log, write it, read it, fit it and draw: small jobs whose answers are known."""
     from pipelines.simulation.example import example_session
 
-    with tempfile.TemporaryDirectory(prefix="rrrid-doctor-") as name:
-        folder = Path(name)
-        logs: list[ExperimentLog] = []
+    logs: list[ExperimentLog] = []
 
-        def simulated() -> str:
-            logs.append(example_session()[0])
-            return f"{logs[0].n_samples} samples in closed loop"
+    def simulated() -> str:
+        logs.append(example_session()[0])
+        return f"{logs[0].n_samples} samples in closed loop"
 
-        yield _tried("simulating a log", simulated)
-        if logs:
-            yield _tried(
-                "HDF5 log, written and read", lambda: _round_trip(folder / "a.h5", logs[0])
-            )
-            parquet = folder / "a.parquet"
-            yield _tried("Parquet log, written and read", lambda: _round_trip(parquet, logs[0]))
-            yield _tried("base parameters", lambda: _fitted(logs[0]))
-            yield _tried("figure", _drawn)
+    yield _tried("simulating a log", simulated)
+    if not logs:
+        return
+    with tempfile.TemporaryDirectory(prefix="rrrid-doctor-") as folder:
+        for container, file in (("HDF5", "a.h5"), ("Parquet", "a.parquet")):
+            work = partial(_round_trip, Path(folder) / file, logs[0])
+            yield _tried(f"{container} log, written and read", work)
+        yield _tried("base parameters", partial(_fitted, logs[0]))
+    yield _tried("figure", _drawn)
 
 
 def _tried(name: str, work: Callable[[], str]) -> Finding:
@@ -148,8 +143,7 @@ def _tried(name: str, work: Callable[[], str]) -> Finding:
         found = clean(f"{type(problem).__name__}: {problem}", 200)
         remedy = "install rrrid anew into a fresh virtual environment"
         return Finding(f"self-test: {name}", "bad", found, remedy)
-    seconds = time.perf_counter() - began
-    return Finding(f"self-test: {name}", "ok", f"{words}, {seconds:.1f} s")
+    return Finding(f"self-test: {name}", "ok", f"{words}, {time.perf_counter() - began:.1f} s")
 
 
 def _round_trip(path: Path, log: ExperimentLog) -> str:
@@ -163,28 +157,21 @@ def _fitted(log: ExperimentLog, close: float = 6.0) -> str:
     """Compare fitted base parameters with those of the arm that was simulated.
 
     Args:
-        close: [std] a fit of three sessions is never so far off.
+        close: [std] a fit is never so far off.
     """
-    from pipelines.estimation.motion import Reconstruction, reconstruct
-    from pipelines.model.estimation.logs import Recipe, fit_logs, with_cutoff
-    from pipelines.model.estimation.nominal import nominal_columns
+    from pipelines.estimate_bps import Settings, compute
     from pipelines.simulation.example import example_arm
 
-    how = Reconstruction()
-    motions = ((log, reconstruct(log, how)),)
-    recipe = with_cutoff(Recipe(how), motions)
-    solution = fit_logs(motions, nominal_columns(log.robot), recipe, True).estimate
+    found = compute(Inputs((Opened(Path("log"), "", log, ()),)), Settings(compare=False))
     truth = {parameter.name: parameter.value for parameter in example_arm().base}
-    names = [column.name for column in solution.columns.names]
     away = [
-        abs(value - truth[name]) / std
-        for name, value, std in zip(names, solution.beta, solution.std, strict=True)
-        if name in truth
+        abs(one.value - truth[one.name]) / one.std
+        for one in found.parameters
+        if one.name in truth and one.value is not None and one.std
     ]
-    farthest = max(away, default=float("nan"))
-    if not farthest <= close:
-        raise ValueError(f"a parameter is {farthest:.1f} std from the truth")
-    return f"{len(away)} parameters within {farthest:.1f} std of the truth"
+    if not max(away, default=float("nan")) <= close:
+        raise ValueError(f"a parameter is {max(away, default=0.0):.1f} std from the truth")
+    return f"{len(away)} parameters within {max(away):.1f} std of the truth"
 
 
 def _drawn() -> str:

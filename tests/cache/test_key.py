@@ -53,7 +53,7 @@ def test_a_stage_consists_of_what_it_imports() -> None:
     sources = read_sources()
     code = code_of("pipelines.frf", sources, "pipelines.report")
     for module in ("pipelines", "pipelines.frf", "pipelines.stage", "pipelines.frequency.result", "pipelines.frequency.rational",
-                   "pipelines.effects.cogging", "pipelines.io.results"):
+                   "pipelines.effects.angle", "pipelines.io.results"):
         assert module in code, module
     assert not [name for name in code if name.startswith("pipelines.report")]
     assert not {"pipelines.validate_writing", "pipelines.run", "pipelines.diagnosis.selection"} & set(code)
