@@ -4,7 +4,8 @@
     simulated.q[3], simulated.tau[3]             what replica 3 would have logged
 
 What a drive adds to the command is white torque noise, held over each sample; encoders count steps
-of their resolution.
+of their resolution. A few RRR arms whose controller and effects need no arrays move one after the
+other in plain numbers, all others side by side in arrays.
 """
 
 from __future__ import annotations
@@ -12,20 +13,20 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 
 from pipelines.io.log import Array
 from pipelines.simulation.config import SIMULATION
-from pipelines.simulation.controller import Controlling
+from pipelines.simulation.controller import Controlling, Feedback, ahead_of
 from pipelines.simulation.experiment import Experiment
-from pipelines.simulation.integrate import HeldBody, RungeKutta
-from pipelines.simulation.one_arm import refuse_runaway, run_alone, runs_alone
-from pipelines.simulation.plant import Plant
+from pipelines.simulation.integrate import OneArm, RungeKutta
+from pipelines.simulation.plant import Plant, refuse_runaway
 
-__all__ = ["Noise", "Simulated", "run", "run_together"]
+__all__ = ["Noise", "Simulated", "run", "run_together", "runs_alone"]
 
-_CHUNK = 2048  # numerics: samples whose noise is drawn at once
+_CHUNK = 2048  # numerics: samples whose noise is drawn at once, or that are Python numbers at once
 _LOOKS = 64  # numerics: samples between two looks at whether an arm runs away
 
 
@@ -53,9 +54,14 @@ class Simulated:
     steps: int  # of the integrator, a sample
 
 
-def run(plant: Plant, experiment: Experiment, steps: int, noise: Noise | None = None,
-        seeds: Iterable[int] = (0,), exact: bool = True,
-        ) -> Simulated:
+def run(
+    plant: Plant,
+    experiment: Experiment,
+    steps: int,
+    noise: Noise | None = None,
+    seeds: Iterable[int] = (0,),
+    exact: bool = True,
+) -> Simulated:
     """Run one replica for each seed, with `steps` steps of the integrator a sample.
 
     Args:
@@ -68,9 +74,14 @@ def run(plant: Plant, experiment: Experiment, steps: int, noise: Noise | None = 
     return run_together(plant, (experiment,), steps, noise, seeds, exact)[0]
 
 
-def run_together(plant: Plant, experiments: Sequence[Experiment], steps: int,
-                 noise: Noise | None = None, seeds: Iterable[int] = (0,), exact: bool = True,
-                 ) -> list[Simulated]:
+def run_together(
+    plant: Plant,
+    experiments: Sequence[Experiment],
+    steps: int,
+    noise: Noise | None = None,
+    seeds: Iterable[int] = (0,),
+    exact: bool = True,
+) -> list[Simulated]:
     """`run` several experiments at once, which costs hardly more than the longest alone.
 
     Raises:
@@ -78,37 +89,41 @@ def run_together(plant: Plant, experiments: Sequence[Experiment], steps: int,
             runs away.
     """
     drawn = tuple(seeds)
-    lanes = [
-        _Lane(plant, one, noise or Noise.none(one.n_joints), drawn, steps) for one in experiments
-    ]
+    lanes = [_Lane(plant, one, noise or Noise.none(one.n_joints), drawn) for one in experiments]
     few = len(lanes) * len(drawn) <= SIMULATION.few
     for time in dict.fromkeys(one.sample_time for one in experiments):
         same = [lane for lane in lanes if lane.experiment.sample_time == time]
         if few and all(runs_alone(plant, lane.experiment) for lane in same):
-            for lane in same:
-                lane.run_alone()
+            for lane, replica in itertools.product(same, range(len(drawn))):
+                _run_alone(OneArm(plant, time, steps, not exact), lane, replica)
         else:
-            _advance(plant, same, exact)
-    return [lane.simulated() for lane in lanes]
+            _advance(plant, same, steps, exact)
+    return [lane.simulated(steps) for lane in lanes]
+
+
+def runs_alone(plant: Plant, experiment: Experiment) -> bool:
+    """Return whether plain numbers are enough: torque hangs on reference and error alone."""
+    law = experiment.controller.law in ("pd", "pd+feedforward") and experiment.driven is None
+    alike = experiment.v is None or experiment.v.ndim == experiment.q_ref.ndim
+    return law and alike and OneArm.fits(plant)
 
 
 class _Lane:
-    """One experiment on the way: its controllers, and what its replicas would have logged."""
+    """One experiment on the way: where its replicas start, and what they would have logged."""
 
-    def __init__(self, plant: Plant, experiment: Experiment, noise: Noise, seeds: tuple[int, ...],
-                 steps: int) -> None:
+    def __init__(
+        self, plant: Plant, experiment: Experiment, noise: Noise, seeds: tuple[int, ...]
+    ) -> None:
         postures = max(1, experiment.n_samples // SIMULATION.postures)
         plant.refuse_unphysical(experiment.q_ref[::postures])
-        replicas, n = len(seeds), experiment.n_joints
+        replicas, n, samples = len(seeds), experiment.n_joints, experiment.n_samples
         moving = plant.prepared(replicas)
-        self.plant, self.experiment, self.steps = plant, experiment, steps
-        self.noise, self.seeds = noise, seeds
+        self.plant, self.experiment, self.noise, self.seeds = plant, experiment, noise, seeds
         self.t = np.full(replicas, experiment.start_time)
         begin = np.concatenate([experiment.q0, experiment.dq0])[:, None]
         begin = np.repeat(begin, replicas, axis=1)
         self.state = np.ascontiguousarray(moving.settled(self.t, begin[:n], begin[n:]))
         self.states = moving.at_start(self.t, self.state[:n], self.state[n:])
-        samples = experiment.n_samples
         self.counted, self.commanded = np.empty((2, samples, n, replicas))
         self.motion = np.empty((samples, 2 * n, replicas))
         self.draws = _draws(noise, seeds, samples)
@@ -122,32 +137,23 @@ class _Lane:
         self.commanded[k] = command = self.control.command(k, self.counted[k])
         return command + extra_torque
 
-    def run_alone(self) -> None:
-        """Run one replica after the other, each from the first to the last sample."""
-        for r, seed in enumerate(self.seeds):
-            draws = _draws(self.noise, (seed,), self.experiment.n_samples)
-            start = np.concatenate([self.state[:, r], self.states[r]])
-            ran = run_alone(self.plant, self.experiment, self.steps, start, draws)
-            self.motion[..., r], self.counted[..., r], self.commanded[..., r] = ran
-
-    def simulated(self) -> Simulated:
+    def simulated(self, steps: int) -> Simulated:
         experiment, n = self.experiment, self.experiment.n_joints
-        samples: Array = np.arange(experiment.n_samples, dtype=np.float64)
-        t = experiment.start_time + experiment.sample_time * samples
-        q, tau, moved = (np.ascontiguousarray(np.moveaxis(x, 2, 0))
-                         for x in (self.counted, self.commanded, self.motion))
+        q, tau, moved = (
+            np.ascontiguousarray(np.moveaxis(x, 2, 0))
+            for x in (self.counted, self.commanded, self.motion)
+        )
         if self.plant.records:
-            tau = np.stack([self.plant.logged(t, one) for one in tau])
-        return Simulated(t, q, tau, moved[..., :n], moved[..., n:], self.steps)
+            tau = np.stack([self.plant.logged(experiment.t, one) for one in tau])
+        return Simulated(experiment.t, q, tau, moved[..., :n], moved[..., n:], steps)
 
 
 @np.errstate(all="ignore")  # numbers of an arm that runs away are not finite before it is refused
-def _advance(plant: Plant, lanes: Sequence[_Lane], exact: bool) -> None:
+def _advance(plant: Plant, lanes: Sequence[_Lane], steps: int, exact: bool) -> None:
     """Move all lanes side by side to the end of the longest; an ended one keeps its torque."""
     width, time, n = len(lanes[0].t), lanes[0].experiment.sample_time, plant.n_joints
     moving = plant.prepared(width * len(lanes))
-    held = not exact and HeldBody.fits(moving)
-    integrator = (HeldBody if held else RungeKutta)(moving, time, lanes[0].steps)
+    integrator = RungeKutta(moving, time, steps, not exact)
     t = np.concatenate([lane.t for lane in lanes])
     state = np.concatenate([lane.state for lane in lanes], axis=1)
     states = np.concatenate([lane.states for lane in lanes])
@@ -155,21 +161,61 @@ def _advance(plant: Plant, lanes: Sequence[_Lane], exact: bool) -> None:
     applied = np.zeros((n, len(t)))
     for k in range(max(lane.experiment.n_samples for lane in lanes)):
         seen = moving.measured(state[:n], states)
-        for lane, part in zip(lanes, parts, strict=True):
-            if k < lane.experiment.n_samples:
-                applied[:, part] = lane.applied(k, state[:, part], seen[:, part])
-        if moving.n_states:
-            states = moving.updated(t, state[:n], state[n:], states, applied)
+        running = [
+            (lane, part)
+            for lane, part in zip(lanes, parts, strict=True)
+            if k < lane.experiment.n_samples
+        ]
+        for lane, part in running:
+            applied[:, part] = lane.applied(k, state[:, part], seen[:, part])
+        states = moving.updated(t, state[:n], state[n:], states, applied)
         states = integrator.advance(t, state, states, applied)
         t += time
-        for lane, part in zip(lanes, parts, strict=True):
-            last = k + 1 == lane.experiment.n_samples
-            if last or (k % _LOOKS == 0 and k < lane.experiment.n_samples):
+        for lane, part in running:
+            if k + 1 == lane.experiment.n_samples or k % _LOOKS == 0:
                 refuse_runaway(state[:, part], k, time)
 
 
-def _draws(noise: Noise, seeds: tuple[int, ...],
-           samples: int) -> Iterator[tuple[Array | float, Array | float]]:
+def _run_alone(arm: OneArm, lane: _Lane, replica: int) -> None:
+    """Move one replica from the first to the last sample, the same law joint by joint."""
+    experiment, time = lane.experiment, lane.experiment.sample_time
+    laws = [Feedback(experiment, joint) for joint in range(experiment.n_joints)]
+    draws = _draws(lane.noise, (lane.seeds[replica],), experiment.n_samples)
+    x: list[float] = [*lane.state[:, replica].tolist(), *lane.states[replica].tolist()]
+    rows = zip(_listed(experiment.q_ref), _listed(ahead_of(experiment)), draws, strict=True)
+    for k, (reference, ahead, (torque, position)) in enumerate(rows):
+        lane.motion[k, :, replica] = x[:6]
+        angles, seen, said = _more(x[:3], position), [], []
+        try:
+            for law, angle, wanted, more in zip(laws, angles, reference, ahead, strict=True):
+                q = angle if law.counts is None else law.counts(angle)
+                seen.append(q)
+                said.append(law.delayed(law.limited(law(q - wanted, more))))
+        except (ValueError, OverflowError):  # of an infinite number there is no count
+            x = [nan] * len(x)
+        if k % _LOOKS == 0 or x[0] != x[0]:
+            refuse_runaway(np.array(x[:6])[:, None], k, time)
+        lane.counted[k, :, replica], lane.commanded[k, :, replica] = seen, said
+        x = arm.moved(x, _more(said, torque))
+    refuse_runaway(np.array(x[:6])[:, None], experiment.n_samples, time)
+
+
+def _more(numbers: list[float], drawn: Array | float) -> list[float]:
+    """Return numbers and the noise (joints, 1) on them, or zero."""
+    if isinstance(drawn, float):
+        return numbers
+    return [a + b for a, b in zip(numbers, drawn[:, 0].tolist(), strict=True)]
+
+
+def _listed(x: Array) -> Iterator[list[float]]:
+    """Yield the rows of `x` as lists; all at once would take ten times the room."""
+    for first in range(0, len(x), _CHUNK):
+        yield from x[first : first + _CHUNK].tolist()
+
+
+def _draws(
+    noise: Noise, seeds: tuple[int, ...], samples: int
+) -> Iterator[tuple[Array | float, Array | float]]:
     """Yield torque and position noise (joints, replicas) of each sample.
 
     Every replica has a generator of its own, so that it does the same alone and among others.

@@ -210,9 +210,7 @@ def _model_ahead(experiment: Experiment) -> Array | None:
         named = _among(law.feedforward, ("friction",))
     if not named:
         return None
-    samples: Array = np.arange(experiment.n_samples, dtype=np.float64)
-    t = experiment.start_time + experiment.sample_time * samples
-    motion = Motion(t, experiment.q_ref, experiment.dq_ref, experiment.ddq_ref)
+    motion = Motion(experiment.t, experiment.q_ref, experiment.dq_ref, experiment.ddq_ref)
     assert experiment.feedforward_arm is not None  # Experiment.of_log refuses the law without it
     parts = experiment.feedforward_arm.nominal.torque_parts(motion)
     return np.asarray(np.sum([getattr(parts, name) for name in named], axis=0))

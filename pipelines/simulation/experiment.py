@@ -18,8 +18,10 @@ __all__ = ["Experiment"]
 _WHERE = "the log can still be simulated in short windows: --windowed"
 # Without these a law cannot be followed.
 _NEEDED = {
-    "pd": ("kp", "kd"), "pd+feedforward": ("kp", "kd", "feedforward"),
-    "computed-torque": ("kp", "kd", "model"), "open-loop": (),
+    "pd": ("kp", "kd"),
+    "pd+feedforward": ("kp", "kd", "feedforward"),
+    "computed-torque": ("kp", "kd", "model"),
+    "open-loop": (),
 }
 
 
@@ -49,6 +51,12 @@ class Experiment:
     @property
     def n_joints(self) -> int:
         return int(self.q_ref.shape[1])
+
+    @property
+    def t(self) -> Array:
+        """[s] (N,)"""
+        samples: Array = np.arange(self.n_samples, dtype=np.float64)
+        return self.start_time + self.sample_time * samples
 
     def part(self, first: int, samples: int) -> Experiment:
         """Return `samples` of it from `first` on, started on the reference."""
@@ -80,8 +88,19 @@ class Experiment:
         started = "tau" in log and bool(np.isfinite(log.tau[0]).all())
         tau0 = log.tau[0] if started else np.zeros(log.n_joints)
         v = _whole(log, "v") if "v" in log else None
-        return cls(log.sample_time, float(log.t[0]), controller, *references,
-                   *_start(log, references), tau0, _resolution(log), v, tau, driven, model)
+        return cls(
+            log.sample_time,
+            float(log.t[0]),
+            controller,
+            *references,
+            *_start(log, references),
+            tau0,
+            _resolution(log),
+            v,
+            tau,
+            driven,
+            model,
+        )
 
 
 def _place(log: ExperimentLog) -> str:
@@ -101,8 +120,9 @@ def _controller(log: ExperimentLog) -> Controller:
     """Return the log's controller; S22 where it cannot be followed."""
     given = log.controller
     if given is None or given.law == "unknown":
-        raise InputRejected("S22", "the log does not say how its controller works",
-                            where=_place(log), remedy=_WHERE)
+        raise InputRejected(
+            "S22", "the log does not say how its controller works", where=_place(log), remedy=_WHERE
+        )
     missing = [key for key in _NEEDED[given.law] if getattr(given, key) is None]
     if given.law == "pd+feedforward" and given.feedforward and given.model is None:
         missing.append("model")
@@ -128,8 +148,9 @@ def _whole(log: ExperimentLog, name: str) -> Array:
     return log[name]
 
 
-def _driven(log: ExperimentLog,
-            controller: Controller) -> tuple[npt.NDArray[np.bool_] | None, Array | None]:
+def _driven(
+    log: ExperimentLog, controller: Controller
+) -> tuple[npt.NDArray[np.bool_] | None, Array | None]:
     """Return which joints the logged torque drives, and that torque.
 
     In an open-loop log that is its moving joint, or all where no joint is named.
@@ -141,15 +162,18 @@ def _driven(log: ExperimentLog,
         driven = np.arange(1, log.n_joints + 1) == log.joint
     known = (controller.kp, controller.kd, controller.velocity)
     if not driven.all() and any(one is None for one in known):
-        words = (f"joint {log.joint} is driven open loop, but the log does not say how the others "
-                 "are held")
+        words = (
+            f"joint {log.joint} is driven open loop, but the log does not say how the others "
+            "are held"
+        )
         remedy = f"give their kp, kd and velocity in the controller group; {_WHERE}"
         raise InputRejected("S22", words, where=_place(log), remedy=remedy)
     return driven, _whole(log, "tau")
 
 
-def _references(log: ExperimentLog,
-                driven: npt.NDArray[np.bool_] | None) -> tuple[Array, Array, Array]:
+def _references(
+    log: ExperimentLog, driven: npt.NDArray[np.bool_] | None
+) -> tuple[Array, Array, Array]:
     """Return q_ref, dq_ref, ddq_ref; a joint that is held without one stays where it starts."""
     if driven is not None and "q_ref" not in log:
         start = np.where(np.isfinite(log.q[0]), log.q[0], 0.0)

@@ -2,7 +2,7 @@
 
     plant = Plant.of(arm)
     moving = plant.prepared(replicas)            with working memory
-    moving.accelerations(t, q, dq, states, command, out)
+    ddq, rates = moving.accelerations(t, q, dq, states, command)
 
 Effects enter through their hooks, in the order in which they act. What follows from angle and
 speed of one joint is a function of numbers or arrays; friction that is a curve of speed alone is
@@ -23,10 +23,10 @@ from pipelines.dynamics.functions import ARRAYS
 from pipelines.effects.base import ArmModel, Effect, Hooks, SpeedCurve, Values
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array
-from pipelines.simulation.bodies import ManyChains, many_bodies
+from pipelines.simulation.bodies import Held, bodies_of, gained
 from pipelines.simulation.config import SIMULATION
 
-__all__ = ["MovingPlant", "Plant"]
+__all__ = ["MovingPlant", "Plant", "refuse_runaway"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,16 +53,22 @@ class Plant:
             if curve is not None and effect.joint is not None:
                 curves[effect.joint - 1].append(curve)
                 continue
-            inside = rigid if place < len(arm.friction) else acting_on
-            own = effect.simulate(inside, values)
+            own = effect.simulate(rigid if place < len(arm.friction) else acting_on, values)
             acting_on = acting_on if own.arm is None else own.arm
             added = added if own.inertia is None else added + own.inertia
             records += [own.record] if own.record else []
             if any((own.load, own.actuator, own.drive, own.sensor, own.settled, own.states)):
                 hooks.append(_alone(effect, values, own))
-        gathered = tuple(_gathered(each) for each in curves)
-        return cls(acting_on.body, acting_on.p, added, gathered, tuple(hooks), arm.nominal.torque,
-                   tuple(records))
+        gathered = tuple(SpeedCurve.total(each, [1.0] * len(each)) for each in curves)
+        return cls(
+            acting_on.body,
+            acting_on.p,
+            added,
+            gathered,
+            tuple(hooks),
+            arm.nominal.torque,
+            tuple(records),
+        )
 
     @property
     def n_joints(self) -> int:
@@ -86,7 +92,8 @@ class Plant:
         if values[worst, 0] <= SIMULATION.singular * values[worst, -1]:
             where = ", ".join(f"{x:.3g}" for x in q[worst])
             raise InputRejected(
-                "D15", f"at q = ({where}) the model's inertia matrix is not positive definite, its "
+                "D15",
+                f"at q = ({where}) the model's inertia matrix is not positive definite, its "
                 f"smallest eigenvalue {values[worst, 0]:.2g}",
                 remedy="such an arm cannot be simulated: fit it to richer motion, or add the "
                 "rotors' inertia",
@@ -106,41 +113,20 @@ def _alone(effect: Effect, values: Values, own: Hooks) -> Hooks:
     return own if load is None else replace(own, load=None, alone=(joint, load))
 
 
-def _gathered(curves: list[SpeedCurve]) -> SpeedCurve:
-    """Return the sum of several curves."""
-    return SpeedCurve(sum(curve.constant for curve in curves),
-                      sum(curve.viscous for curve in curves),
-                      tuple(height for curve in curves for height in curve.heights),
-                      tuple(sharpness for curve in curves for sharpness in curve.sharpnesses),
-                      )
+def refuse_runaway(state: Array, k: int, sample_time: float) -> None:
+    """Refuse a state (2 joints, replicas) that no arm is ever in.
 
-
-class _Curves:
-    """Friction curves of all joints in a few array operations.
-
-    τ = constant + viscous v + Σ height tanh(sharpness v), joint by joint; joints with fewer
-    sigmoids have zeros.
+    Raises:
+        InputRejected: D17, the simulated arm runs away.
     """
-
-    def __init__(self, curves: tuple[SpeedCurve, ...]) -> None:
-        most = max(len(curve.heights) for curve in curves)
-        terms = np.zeros((2, most, len(curves), 1))
-        for joint, curve in enumerate(curves):
-            terms[0, :len(curve.heights), joint, 0] = curve.heights
-            terms[1, :len(curve.heights), joint, 0] = curve.sharpnesses
-        self.heights, self.sharpnesses = terms
-        self.constant = np.array([curve.constant for curve in curves])[:, None]
-        self.viscous = np.array([curve.viscous for curve in curves])[:, None]
-
-    def taken_off(self, torque: Array, dq: Array) -> Array:
-        """Return `torque` less friction, all (joints, replicas)."""
-        left = torque - self.viscous * dq - self.constant
-        if self.heights.size:
-            bent = self.sharpnesses * dq
-            np.tanh(bent, out=bent)
-            bent *= self.heights
-            left -= np.add.reduce(bent, axis=0)
-        return np.asarray(left)
+    here = np.abs(state) <= SIMULATION.runaway  # what is not a number is no motion either
+    if not here.all():
+        joint = int(np.argmax(~here.all(axis=1))) % (len(state) // 2) + 1
+        raise InputRejected(
+            "D17",
+            f"the simulated arm runs away: joint {joint}, after {k * sample_time:.3g} s",
+            remedy="check the model's inertia and friction, and the gains that the log gives",
+        )
 
 
 class MovingPlant:
@@ -148,66 +134,76 @@ class MovingPlant:
 
     def __init__(self, plant: Plant, replicas: int) -> None:
         self.plant, self.replicas = plant, replicas
-        self.rigid = many_bodies(plant.body, plant.p, plant.added, replicas)
-        self.friction = _Curves(plant.curves)
+        self.rigid = bodies_of(plant.body, plant.p, plant.added, replicas)
+        self._constant = np.array([curve.constant for curve in plant.curves])[:, None]
+        self._viscous = np.array([curve.viscous for curve in plant.curves])[:, None]
+        most = max(len(curve.heights) for curve in plant.curves)
+        sigmoids = np.zeros((2, most, plant.n_joints, 1))  # a joint with fewer has zeros
+        for joint, curve in enumerate(plant.curves):
+            sigmoids[:, : len(curve.heights), joint, 0] = curve.heights, curve.sharpnesses
+        self._heights, self._sharpnesses = sigmoids
         ends = np.cumsum([0, *(hook.states for hook in plant.hooks)]).tolist()
         self.n_states = ends[-1]
-        pairs = zip(plant.hooks, ends, ends[1:], strict=False)
-        self._hooked = [(hook, slice(a, b)) for hook, a, b in pairs]
-        self._driving = [(hook, own) for hook, own in reversed(self._hooked)
-                         if hook.drive or hook.actuator or hook.rate]
-        self._alone = [hook.alone for hook in plant.hooks if hook.alone]
-        self._remembering = [(hook.remembering, own.start) for hook, own in self._hooked
-                             if hook.remembering]
-        self._loads = [(hook.load, own) for hook, own in self._hooked if hook.load]
+        self._hooked = [
+            (hook, slice(a, b)) for hook, a, b in zip(plant.hooks, ends, ends[1:], strict=False)
+        ]
         self._zeros = np.zeros((replicas, plant.n_joints))
 
     def motion(self, t: Array, q: Array, dq: Array, ddq: Array | None = None) -> Motion:
         """Return the state as effects see it, (replicas, joints)."""
         return Motion(t, q.T, dq.T, self._zeros if ddq is None else ddq.T)
 
-    def accelerations(self, t: Array, q: Array, dq: Array, states: Array, command: Array,
-                      out: Array, held: ManyChains | None = None,
-                      ) -> Array:
-        """Write ddq (joints, replicas) into `out`, and return d(states)/dt (replicas, states).
+    def accelerations(
+        self, t: Array, q: Array, dq: Array, states: Array, command: Array, held: Held | None = None
+    ) -> tuple[Array, Array]:
+        """Return ddq (joints, replicas), and d(states)/dt (replicas, states).
 
         Args:
             t: (replicas,); states (replicas, states); the rest (joints, replicas).
-            held: a rigid body that is taken as it was last held.
+            held: a rigid body that is taken in place of that of q and dq.
         """
         rates = states
         if self._hooked:
-            command, rates = self.through(t, q, dq, states, command)
-        left = self.friction.taken_off(command, dq)
-        if held is None:
-            self.rigid.acceleration(q, dq, left, out)
-        else:
-            held.held_acceleration(left, out)
-        return rates
+            command, rates = self._through(t, q, dq, states, command)
+        left = command - self._viscous * dq - self._constant
+        if self._heights.size:  # Σ height tanh(sharpness v)
+            bent = self._sharpnesses * dq
+            np.tanh(bent, out=bent)
+            bent *= self._heights
+            left -= np.add.reduce(bent, axis=0)
+        inverse, bias = self.rigid.hold(q, dq) if held is None else held
+        return gained(inverse, left - bias), rates
 
-    def through(self, t: Array, q: Array, dq: Array, states: Array,
-                command: Array) -> tuple[Array, Array]:
+    def _through(
+        self, t: Array, q: Array, dq: Array, states: Array, command: Array
+    ) -> tuple[Array, Array]:
         """Return what comes of `command` at the rigid body, and d(states)/dt.
 
         Each effect acts around those before it: a command meets the last one first.
         """
         rates, torque = np.zeros_like(states), command.copy()
         motion = self.motion(t, q, dq)
-        for hook, own in self._driving:
+        for hook, own in reversed(self._hooked):
             if hook.rate is not None:
                 rates[:, own] = hook.rate(motion, torque.T, states[:, own])
             torque = _driven(hook, own, motion, dq, states, torque)
-        for joint, load in self._alone:
-            torque[joint] -= load(q[joint], dq[joint], ARRAYS)
-        for (joint, memory), place in self._remembering:
-            rates[:, place] = rate = memory.rate(states[:, place], dq[joint], ARRAYS)
-            torque[joint] -= memory.load(states[:, place], rate)
-        for loaded, own in self._loads:
-            torque -= loaded(motion, states[:, own]).T
+        for hook, own in self._hooked:
+            if hook.alone is not None:
+                joint, load = hook.alone
+                torque[joint] -= load(q[joint], dq[joint], ARRAYS)
+            if hook.remembering is not None:
+                joint, memory = hook.remembering
+                bent = states[:, own.start]
+                rates[:, own.start] = rate = memory.rate(bent, dq[joint], ARRAYS)
+                torque[joint] -= memory.load(bent, rate)
+            if hook.load is not None:
+                torque -= hook.load(motion, states[:, own]).T
         return torque, rates
 
     def updated(self, t: Array, q: Array, dq: Array, states: Array, command: Array) -> Array:
         """Return the states (replicas, states) after a control sample was taken."""
+        if not self.n_states:
+            return states
         out, motion, torque = states.copy(), self.motion(t, q, dq), command.copy()
         for hook, own in reversed(self._hooked):
             if hook.update:
@@ -241,8 +237,9 @@ class MovingPlant:
         return seen.T
 
 
-def _driven(hook: Hooks, own: slice, motion: Motion, dq: Array, states: Array,
-            torque: Array) -> Array:
+def _driven(
+    hook: Hooks, own: slice, motion: Motion, dq: Array, states: Array, torque: Array
+) -> Array:
     """Return what an effect makes of a torque (joints, replicas) on its way to the joints."""
     if hook.drive is not None:
         joint, drive = hook.drive

@@ -23,7 +23,6 @@ from pipelines.io.log import Array
 from pipelines.simulation.closed_loop import Noise, Simulated, run, run_together
 from pipelines.simulation.config import SIMULATION
 from pipelines.simulation.experiment import Experiment
-from pipelines.simulation.integrate import HeldBody
 from pipelines.simulation.plant import Plant
 
 __all__ = ["Step", "choose_step", "simulate"]
@@ -40,8 +39,13 @@ class Step:
     exact: bool  # the rigid body is nowhere held
 
 
-def simulate(arm: Arm, experiment: Experiment, noise: Noise | None = None,
-             seeds: Iterable[int] = (0,), step: Step | None = None) -> Simulated:
+def simulate(
+    arm: Arm,
+    experiment: Experiment,
+    noise: Noise | None = None,
+    seeds: Iterable[int] = (0,),
+    step: Step | None = None,
+) -> Simulated:
     """Return what `arm` would have logged in `experiment`, once for each seed.
 
     Args:
@@ -69,20 +73,19 @@ def choose_step(plant: Plant, experiment: Experiment, noise: Noise | None = None
     counted = experiment.resolution / np.sqrt(6.0)  # of the difference of two unrelated counts
     allowed = np.maximum(SIMULATION.share * np.maximum(random, counted), SIMULATION.unheard)
     calm = [_without_steps(stretch) for stretch in stretches]
-    held = HeldBody.fits(plant.prepared(1))
     coarse: list[Array] | None = None
     for steps in SIMULATION.steps:
         fine = _positions(plant, calm, 2 * steps)
-        if held:
-            error = _rms(_positions(plant, calm, steps, exact=False), fine)
-            if (error <= allowed).all():
-                return Step(steps, error, random, allowed, exact=False)
+        error = _rms(_positions(plant, calm, steps, exact=False), fine)
+        if (error <= allowed).all():
+            return Step(steps, error, random, allowed, exact=False)
         error = _rms(_positions(plant, calm, steps) if coarse is None else coarse, fine)
         if (error <= allowed).all():
             return Step(steps, error, random, allowed, exact=True)
         coarse = fine
     raise InputRejected(
-        "D17", f"with {SIMULATION.steps[-1]} steps a sample the simulation still is "
+        "D17",
+        f"with {SIMULATION.steps[-1]} steps a sample the simulation still is "
         f"{float(error.max()):.2g} rad off",
         remedy="friction that changes sign within a very small speed needs a lower sharpness",
     )
@@ -98,11 +101,12 @@ def _stretches(experiment: Experiment) -> list[Experiment]:
     length = min(experiment.n_samples, length)
     speed = experiment.dq_ref
     activities: list[npt.NDArray[Any]] = [
-        np.diff(np.signbit(speed), axis=0) != 0, speed[1:]**2,
-        np.diff(speed, axis=0)**2,
+        np.diff(np.signbit(speed), axis=0) != 0,
+        speed[1:] ** 2,
+        np.diff(speed, axis=0) ** 2,
     ]
     if experiment.tau is not None:
-        activities.append(experiment.tau[1:]**2)
+        activities.append(experiment.tau[1:] ** 2)
     starts = [0]
     for activity in activities:
         share = activity / np.maximum(activity.sum(axis=0), 1e-300)  # numerics: of each joint's
@@ -118,8 +122,9 @@ def _without_steps(experiment: Experiment) -> Experiment:
     return replace(experiment, controller=controller, resolution=ideal)
 
 
-def _positions(plant: Plant, stretches: list[Experiment], steps: int,
-               exact: bool = True) -> list[Array]:
+def _positions(
+    plant: Plant, stretches: list[Experiment], steps: int, exact: bool = True
+) -> list[Array]:
     """Return true positions (samples, joints) of each stretch; not numbers where it runs away."""
     with np.errstate(all="ignore"):
         try:
@@ -141,5 +146,5 @@ def _noise_difference(plant: Plant, stretches: list[Experiment], noise: Noise) -
 
 def _rms(some: list[Array], others: list[Array]) -> Array:
     """Return the largest rms difference of any pair (joints,); infinite where one ran away."""
-    each = [np.sqrt(np.mean((a - b)**2, axis=0)) for a, b in zip(some, others, strict=True)]
+    each = [np.sqrt(np.mean((a - b) ** 2, axis=0)) for a, b in zip(some, others, strict=True)]
     return np.asarray(np.where(np.isfinite(each), each, np.inf).max(axis=0))

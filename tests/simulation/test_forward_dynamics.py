@@ -11,8 +11,7 @@ import pytest
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Array
 from pipelines.effects.bodies import RotorInertia
-from pipelines.simulation.integrate import RungeKutta
-from pipelines.simulation.one_arm import OneArm
+from pipelines.simulation.integrate import OneArm, RungeKutta
 from pipelines.simulation.plant import Plant
 from tests.dynamics.serial_arms import ARMS
 from tests.seeds import rarely
@@ -24,11 +23,10 @@ CHAINS = tuple(name for name in ARMS if name != "rrr")
 
 def accelerations(plant: Plant, q: Array, dq: Array, torque: Array) -> Array:
     """(states, joints) of as many replicas at once."""
-    out = np.empty(q.T.shape)
     moving = plant.prepared(len(q))
-    moving.accelerations(np.zeros(len(q)), *(np.ascontiguousarray(x.T) for x in (q, dq)), np.zeros((len(q), 0)),
-                         np.ascontiguousarray(torque.T), out)
-    return out.T
+    found, _ = moving.accelerations(np.zeros(len(q)), *(np.ascontiguousarray(x.T) for x in (q, dq)), np.zeros((len(q), 0)),
+                                    np.ascontiguousarray(torque.T))
+    return found.T
 
 
 def offsets(arm: Arm) -> Array:
@@ -99,6 +97,9 @@ def follow(integrator: OneArm | RungeKutta, start: Array, torque: Array, replica
     rows = []
     for k, row in enumerate(torque):
         rows.append(state[:n].T.copy())
+        if isinstance(integrator, OneArm):
+            state[:, 0] = integrator.moved(state[:, 0].tolist(), row.tolist())
+            continue
         integrator.advance(np.full(replicas, TS * k), state, np.zeros((replicas, 0)), np.repeat(row[:, None], replicas, axis=1))
     return np.array(rows)
 

@@ -13,11 +13,11 @@ from pipelines.io.log import Controller
 from pipelines.simulation import Experiment, Noise, choose_step
 from pipelines.simulation.closed_loop import run_together
 from pipelines.simulation.imitate import How, imitate
-from pipelines.simulation.integrate import HeldBody
+from pipelines.simulation.integrate import RungeKutta
 from pipelines.simulation.plant import Plant
 from pipelines.writing.task import planned_log
 from tests.seeds import rarely
-from tests.simulation.arms import TS, Case, rrr, serial
+from tests.simulation.arms import KD, KP, TS, Case, experiment, rrr, serial
 from tests.simulation.pinocchio_loop import Loop
 from tests.simulation.test_forward_dynamics import follow, offsets
 
@@ -29,7 +29,7 @@ def missed(name: str, shared: Path, folder: Path, torque: Array, *steps: int) ->
     case = serial(name, shared, folder)
     start = np.linspace(-0.5, 0.5, case.n)
     judge, _, _ = Loop(case.model, steps=4).run(start + offsets(case.arm), np.zeros(case.n), lambda k, q: torque[k], SAMPLES)
-    own = [follow(HeldBody(Plant.of(case.arm).prepared(1), TS, count), start, torque, 1)[:, 0] for count in steps]
+    own = [follow(RungeKutta(Plant.of(case.arm).prepared(1), TS, count, held=True), start, torque, 1)[:, 0] for count in steps]
     return [float(np.sqrt(np.mean(np.square(found + offsets(case.arm) - judge)))) for found in own]
 
 
@@ -96,8 +96,14 @@ def test_a_replica_does_the_same_alone_and_beside_a_shorter_run(shared: Path, tm
     np.testing.assert_allclose(both[0].true_q[1], alone[0].true_q[0], rtol=0.0, atol=1e-14)
 
 
-def test_an_arm_in_closed_form_is_not_held() -> None:
-    moving = Plant.of(rrr().arm).prepared(2)
-    assert not HeldBody.fits(moving)
-    with pytest.raises(TypeError, match="not held"):
-        HeldBody(moving, TS, 1)
+@pytest.mark.parametrize("held", [False, True])
+def test_one_arm_without_arrays_moves_as_among_many_held_or_not(held: bool) -> None:
+    """Plain numbers and arrays share one body over the same steps."""
+    plant = Plant.of(rrr().arm)
+    asked = experiment(Controller("pd", KP, KD, velocity="backward-difference"), SAMPLES)
+    noise = Noise(np.array([0.3, 0.2, 0.1]), np.zeros(3))
+    alone, among = (run_together(plant, [asked], 2, noise, seeds, not held)[0].true_q[0] for seeds in ((7,), (7, *range(9))))
+    np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-12)
+    exact = run_together(plant, [asked], 2, noise, (7,))[0].true_q[0]
+    assert bool(np.abs(alone - exact).max() > 1e-10) is held
+    assert np.abs(alone - exact).max() < 1e-6

@@ -19,8 +19,8 @@ from pipelines.effects.presliding import Presliding
 from pipelines.errors import InputRejected
 from pipelines.io.log import Controller
 from pipelines.simulation import Noise, Plant, run
-from pipelines.simulation.integrate import RungeKutta
-from pipelines.simulation.one_arm import OneArm, runs_alone
+from pipelines.simulation.closed_loop import runs_alone
+from pipelines.simulation.integrate import OneArm, RungeKutta
 from tests.simulation.arms import KD, KP, TS, experiment, rrr
 
 SAMPLES, MANY = 100, 9  # more replicas than are run one after the other
@@ -85,9 +85,10 @@ def test_the_integrator_moves_memories_as_runge_kutta_does() -> None:
     other, others, seen = np.repeat(state, 2, axis=1), np.zeros((2, 2)), []
     for k in range(300):
         torque = np.array([[3.0], [8.0], [2.0]]) * np.sin(0.03 * k + np.arange(3.0)[:, None])
-        states = ours.advance(np.array([TS * k]), state, states, torque)
+        now = ours.moved([*state[:, 0].tolist(), *states[0].tolist()], torque[:, 0].tolist())
+        state[:, 0], states[0] = now[:6], now[6:]
         others = theirs.advance(np.full(2, TS * k), other, others, np.repeat(torque, 2, axis=1))
-        seen.append(states[0])
+        seen.append(states[0].copy())
     np.testing.assert_allclose(state[:, 0], other[:, 1], rtol=0.0, atol=1e-10)
     np.testing.assert_allclose(states[0], others[1], rtol=0.0, atol=1e-10)
     assert np.ptp(seen, axis=0).min() > 1.0  # they bent to one side, and to the other
