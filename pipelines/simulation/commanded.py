@@ -77,7 +77,7 @@ def against_command(s: Subject) -> tuple[Check, ...]:
     most = round(COMMAND.latest / s.log.sample_time)
     likes: dict[int, Likeness] = {}
     for j in range(s.log.n_joints):
-        like = _likeness(s.log.tau[: len(wanted), j], wanted[:, j], most)
+        like = _likeness(s.log.tau[:len(wanted), j], wanted[:, j], most)
         if like is not None and like.sure:
             likes[j] = like
     every = len(likes) == s.log.n_joints and all(_scaled(s, like) for like in likes.values())
@@ -94,28 +94,22 @@ def _said(s: Subject, j: int, like: Likeness, wanted: Array, every: bool) -> Che
     late, size, here = like.late * s.log.sample_time, abs(like.scale), f"tau of joint {j + 1} is"
     if like.scale < 0.0:
         code, words = "S14", f"{like.scale:.3g} times what the controller of this log commands"
-        remedy = "change the sign of this torque on import, or those of the controller's gains"
+        remedy = ("change the sign of this torque on import, or those of the controller's gains")
     elif _scaled(s, like):
         code = "S10" if every else "S15"
         what = "another gear ratio or torque constant"
         if every:
             what = "motor current in A, or torque of another side of the gear"
-        words = (
-            f"{size:.3g} times what the controller of this log commands: {what}; or its "
-            f"position and reference are {1.0 / size:.3g} times as large as they should be"
-        )
-        remedy = (
-            f"divide it by {size:.3g}: import the recording anew with torque constants and "
-            "gear ratios, or declare its unit; or correct the gains of the controller"
-        )
+        words = (f"{size:.3g} times what the controller of this log commands: {what}; or its "
+                 f"position and reference are {1.0 / size:.3g} times as large as they should be")
+        remedy = (f"divide it by {size:.3g}: import the recording anew with torque constants and "
+                  "gear ratios, or declare its unit; or correct the gains of the controller")
     elif s.log.torque != "measured" and _stamped(s, j, like, wanted):
         side = "after" if late > 0 else "before"
         code = "T06"
         words = f"stamped {1e3 * abs(late):.3g} ms {side} the controller of this log commands it"
-        remedy = (
-            "stamp position and torque by one clock: shift this torque by as much on import; "
-            "or correct the gains of the controller"
-        )
+        remedy = ("stamp position and torque by one clock: shift this torque by as much on import; "
+                  "or correct the gains of the controller")
     else:
         return None
     return s.say(code, "warn", f"{here} {words}", signal="tau", joint=j, gate=True, remedy=remedy)
@@ -128,7 +122,7 @@ def _stamped(s: Subject, j: int, like: Likeness, wanted: Array) -> bool:
         return False
     if like.left > COMMAND.left_late:
         return False
-    tau = s.log.tau[: len(wanted), j]
+    tau = s.log.tau[:len(wanted), j]
     lags = [factor * like.late for factor in COMMAND.lags] if like.late > 0 else []
     return all(_smoothed_left(tau, wanted, lag) > like.left for lag in lags)
 
@@ -152,7 +146,7 @@ def _likeness(tau: Array, command: Array, most: int) -> Likeness | None:
     n = len(tau)
     if n <= 4 * most or not np.isfinite(tau).all() or np.std(tau) == 0.0 or np.std(command) == 0.0:
         return None
-    inner = tau[most : n - most]
+    inner = tau[most:n - most]
     if np.ptp(inner) == 0.0:
         return None
     # row k: the command k - most samples before
@@ -163,4 +157,4 @@ def _likeness(tau: Array, command: Array, most: int) -> Likeness | None:
     best = int(np.argmin(left))
     scale = float(product[best] / max(power[best], 1e-300))
     plain = float(np.sum(np.square(y - x[most])) / float(y @ y))
-    return Likeness(scale, best - most, plain**0.5, max(float(left[best]), 0.0) ** 0.5)
+    return Likeness(scale, best - most, plain**0.5, max(float(left[best]), 0.0)**0.5)

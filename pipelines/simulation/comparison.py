@@ -28,16 +28,8 @@ from pipelines.simulation.plant import Plant
 from pipelines.simulation.replay import Windows, held_torque, simulate_windows
 from pipelines.simulation.step import choose_step
 
-__all__ = [
-    "Positions",
-    "SimulatedSpan",
-    "Simulation",
-    "Strayed",
-    "in_loop",
-    "in_loops",
-    "nearer",
-    "simulation_errors",
-]
+__all__ = ["Positions", "SimulatedSpan", "Simulation", "Strayed", "in_loop", "in_loops", "nearer",
+           "simulation_errors"]
 
 # simulated and measured (samples, joints) [rad], and the time between samples [s]
 Positions = tuple[Array, Array, float]
@@ -94,7 +86,7 @@ def simulation_errors(arms: Sequence[Arm], motions: Motions) -> list[Simulation]
     none = [Simulation.none(arm.n_joints) for arm in arms]
     if not motions:
         return none
-    logs = motions[: SIMULATION.logs]
+    logs = motions[:SIMULATION.logs]
     hooks = [hook for arm in arms for hook in Plant.of(arm).hooks]
     soft = any(hook.rate or hook.remembering for hook in hooks)
     slow = soft or any(hook.actuator and hook.states for hook in hooks)
@@ -133,7 +125,8 @@ def in_loop(arm: Arm, log: ExperimentLog) -> bool:
     return True
 
 
-def in_loops(arms: Sequence[Arm], motions: Motions, seconds: float) -> list[list[Positions] | None]:
+def in_loops(arms: Sequence[Arm], motions: Motions,
+             seconds: float) -> list[list[Positions] | None]:
     """Return the positions of each arm in each log, over its first `seconds`.
 
     None of one that runs away, or is none that can be simulated. What step suffices for a log
@@ -156,13 +149,12 @@ def in_loops(arms: Sequence[Arm], motions: Motions, seconds: float) -> list[list
             found.append(None)
             continue
         pairs = [(one.q[0], log) for one, (log, _) in zip(moved, motions, strict=True)]
-        found.append([(q, log.q[: len(q)], log.sample_time) for q, log in pairs])
+        found.append([(q, log.q[:len(q)], log.sample_time) for q, log in pairs])
     return found
 
 
-def _told(
-    arms: Sequence[Arm], motions: Motions, every: Sequence[list[Positions] | None], closed: bool
-) -> list[Simulation]:
+def _told(arms: Sequence[Arm], motions: Motions, every: Sequence[list[Positions] | None],
+          closed: bool) -> list[Simulation]:
     """Return how far each arm is off, of its positions in each log."""
     found = []
     for arm, positions in zip(arms, every, strict=True):
@@ -171,7 +163,8 @@ def _told(
     return found
 
 
-def _errors(arm: Arm, motions: Motions, positions: Sequence[Positions], closed: bool) -> Simulation:
+def _errors(arm: Arm, motions: Motions, positions: Sequence[Positions],
+            closed: bool) -> Simulation:
     square, away, span = [], [], []
     for (q, seen, between), (log, _) in zip(positions, motions, strict=True):
         known = np.isfinite(q + seen).all(axis=1)
@@ -186,7 +179,7 @@ def _errors(arm: Arm, motions: Motions, positions: Sequence[Positions], closed: 
     if not closed:
         return Simulation("windowed", position, tip, power, span=tuple(span))
     (log, _), (q, seen, _) = motions[0], positions[0]
-    first = Strayed(log.name, log.t[: len(q)] - log.t[0], q - seen)
+    first = Strayed(log.name, log.t[:len(q)] - log.t[0], q - seen)
     return Simulation("closed-loop", position, tip, power, first, tuple(span))
 
 
@@ -220,9 +213,8 @@ def _in_windows(arm: Arm, motions: Motions, exact: float) -> list[Positions] | N
     return pairs
 
 
-def _windowed(
-    arm: Arm, log: ExperimentLog, found: Reconstructed, exact: float, steps: int | None
-) -> tuple[Windows, Motion, float]:
+def _windowed(arm: Arm, log: ExperimentLog, found: Reconstructed, exact: float,
+              steps: int | None) -> tuple[Windows, Motion, float]:
     """Return the windows, the measured motion, and the time between its samples [s]."""
     usable = np.zeros(log.n_samples, dtype=bool)
     usable[found.good.kept] = found.good.fit
@@ -230,20 +222,17 @@ def _windowed(
     between = every * log.sample_time
     length = max(SIMULATION.window_samples, round(SIMULATION.window / between))
     for count in dict.fromkeys((steps, None)):  # livelier than the log they were chosen for?
-        windows = simulate_windows(
-            Plant.of(arm), motion, tau, between, length, usable, exact, count
-        )
+        windows = simulate_windows(Plant.of(arm), motion, tau, between, length, usable, exact,
+                                   count)
         if np.isfinite(windows.q[windows.first[:, None] + np.arange(length)]).all():
             return windows, motion, between
     # left out, it would count as no error at all
-    raise InputRejected(
-        "D17", "the arm runs away in a window", where=log.name, remedy="look at its inertia"
-    )
+    raise InputRejected("D17", "the arm runs away in a window", where=log.name,
+                        remedy="look at its inertia")
 
 
-def _coarser(
-    motion: Motion, tau: Array, usable: npt.NDArray[np.bool_], sample_time: float
-) -> tuple[Motion, Array, npt.NDArray[np.bool_], int]:
+def _coarser(motion: Motion, tau: Array, usable: npt.NDArray[np.bool_],
+             sample_time: float) -> tuple[Motion, Array, npt.NDArray[np.bool_], int]:
     """Return every Nth sample of a motion, the mean torque until the next, and what is usable."""
     every = max(1, int(SIMULATION.fine / sample_time * (1.0 + 1e-9)))  # numerics: rounding
     if every == 1:
@@ -253,5 +242,5 @@ def _coarser(
     good = np.asarray(usable & ~(np.abs(steps - sample_time) > 0.5 * sample_time))
     some = slice(0, count * every, every)
     thin = Motion(motion.t[some], motion.q[some], motion.dq[some], motion.ddq[some])
-    mean = np.asarray(tau[: count * every].reshape(count, every, -1).mean(axis=1))
-    return thin, mean, np.asarray(good[: count * every].reshape(count, every).all(axis=1)), every
+    mean = np.asarray(tau[:count * every].reshape(count, every, -1).mean(axis=1))
+    return thin, mean, np.asarray(good[:count * every].reshape(count, every).all(axis=1)), every

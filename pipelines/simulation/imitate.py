@@ -1,8 +1,8 @@
 """Imitate one log: simulate what it recorded, in closed loop or in short windows, and compare.
 
-found = imitate(log, arm, How(replicas=5))
-found.position_rms                       [rad] simulated minus measured, joint by joint
-found.logs                               what the replicas would have logged
+    found = imitate(log, arm, How(replicas=5))
+    found.position_rms                       [rad] simulated minus measured, joint by joint
+    found.logs                               what the replicas would have logged
 """
 
 from __future__ import annotations
@@ -51,43 +51,20 @@ class How:
         """
         longest, most = SIMULATION.window_longest, SIMULATION.most
         wrong = (
-            (
-                bool(self.noise) and len(self.noise) not in (1, n_joints),
-                "--noise",
-                f"{len(self.noise)} noise levels for {n_joints} joints",
-                "give one, or one a joint",
-            ),
-            (
-                any(not 0.0 <= level < np.inf for level in self.noise),
-                "--noise",
-                "a noise level below zero",
-                "give standard deviations in N m",
-            ),
-            (
-                not 1 <= self.replicas <= most,
-                "--replicas",
-                f"{self.replicas} replicas",
-                f"give 1 to {most}",
-            ),
+            (bool(self.noise) and len(self.noise) not in (1, n_joints), "--noise",
+             f"{len(self.noise)} noise levels for {n_joints} joints", "give one, or one a joint"),
+            (any(not 0.0 <= level < np.inf for level in self.noise), "--noise",
+             "a noise level below zero", "give standard deviations in N m"),
+            (not 1 <= self.replicas <= most, "--replicas", f"{self.replicas} replicas",
+             f"give 1 to {most}"),
             (self.seed < 0, "--seed", f"seed {self.seed}", "give 0 or more"),
-            (
-                self.steps is not None and not 1 <= self.steps <= most,
-                "--steps",
-                f"{self.steps} steps a sample",
-                f"give 1 to {most}",
-            ),
-            (
-                not 0.0 < self.window <= longest,
-                "--window",
-                f"windows of {self.window:g} s",
-                f"give up to {longest:g} s",
-            ),
-            (
-                self.replicas > 1 and not any(self.noise),
-                "--replicas",
-                f"{self.replicas} replicas without noise are all the same",
-                "say how large the drives' noise is, with --noise",
-            ),
+            (self.steps is not None and not 1 <= self.steps <= most, "--steps",
+             f"{self.steps} steps a sample", f"give 1 to {most}"),
+            (not 0.0 < self.window <= longest, "--window", f"windows of {self.window:g} s",
+             f"give up to {longest:g} s"),
+            (self.replicas > 1 and not any(self.noise), "--replicas",
+             f"{self.replicas} replicas without noise are all the same",
+             "say how large the drives' noise is, with --noise"),
         )
         for fails, where, words, remedy in wrong:
             if fails:
@@ -128,43 +105,17 @@ class Imitation:
         kinds = log.robot.revolute
         law = "unknown" if log.controller is None else log.controller.law
         q, tau = (tuple(schema.joint_unit(name, kind) for kind in kinds) for name in ("q", "tau"))
-        return cls(
-            log.name,
-            log.source,
-            (),
-            simulation,
-            reason,
-            law,
-            log.n_samples,
-            1,
-            q,
-            tau,
-            None,
-            None,
-            None,
-            None,
-            None,
-            steps,
-            None,
-            None,
-            None,
-            (),
-        )
+        return cls(log.name, log.source, (), simulation, reason, law, log.n_samples, 1, q, tau,
+                   None, None, None, None, None, steps, None, None, None, ())
 
     def compared(self, q: Array, dq: Array, tau: Array | None) -> Imitation:
         """Return it with what is off in position, speed and torque, (replicas, samples, joints)."""
-        return replace(
-            self,
-            position_rms=_rms(q),
-            position_max=np.nanmax(np.abs(q), axis=(0, 1)),
-            speed_rms=_rms(dq),
-            torque_rms=None if tau is None else _rms(tau),
-        )
+        return replace(self, position_rms=_rms(q), position_max=np.nanmax(np.abs(q), axis=(0, 1)),
+                       speed_rms=_rms(dq), torque_rms=None if tau is None else _rms(tau))
 
 
-def imitate(
-    log: ExperimentLog, arm: Arm, how: How, file: str, settings: object = None, draw: bool = True
-) -> Imitation:
+def imitate(log: ExperimentLog, arm: Arm, how: How, file: str, settings: object = None,
+            draw: bool = True) -> Imitation:
     """Simulate `arm` in the experiment of `log`.
 
     Args:
@@ -206,9 +157,8 @@ def imitate(
     return replace(found, course=course(log, *pairs))
 
 
-def _closed_loop(
-    log: ExperimentLog, plant: Plant, experiment: Experiment, how: How
-) -> tuple[Simulated, Imitation]:
+def _closed_loop(log: ExperimentLog, plant: Plant, experiment: Experiment,
+                 how: How) -> tuple[Simulated, Imitation]:
     """Return what the replicas did, and what is known of it without the log's measurements."""
     levels = np.broadcast_to(np.array(how.noise or (0.0,), dtype=np.float64), (log.n_joints,))
     noise, seeds = Noise(levels, np.zeros(log.n_joints)), range(how.seed, how.seed + how.replicas)
@@ -223,9 +173,8 @@ def _closed_loop(
     return done, replace(found, step_error=error, noise_rms=between)
 
 
-def _in_windows(
-    log: ExperimentLog, bare: ExperimentLog, plant: Plant, how: How, reason: str, draw: bool
-) -> Imitation:
+def _in_windows(log: ExperimentLog, bare: ExperimentLog, plant: Plant, how: How, reason: str,
+                draw: bool) -> Imitation:
     length = max(SIMULATION.window_samples, round(how.window / log.sample_time))
     found = reconstruct(log, Reconstruction())
     usable: npt.NDArray[np.bool_] = np.zeros(log.n_samples, dtype=bool)
@@ -244,18 +193,15 @@ def _rms(x: Array) -> Array:
     return np.asarray(np.sqrt(np.nanmean(x**2, axis=(0, 1))))
 
 
-def _simulated_log(
-    log: ExperimentLog, done: Simulated, replica: int, settings: object
-) -> ExperimentLog:
+def _simulated_log(log: ExperimentLog, done: Simulated, replica: int,
+                   settings: object) -> ExperimentLog:
     """Return what a replica would have logged: a log derived from the one it imitates."""
     values = {"t": done.t, "q": done.q[replica], "tau": done.tau[replica]}
-    signals = {
-        name: Signal(x, schema.unit_of(name), schema.SIGNALS[name][1]) for name, x in values.items()
-    }
+    signals = {name: Signal(x, schema.unit_of(name), schema.SIGNALS[name][1])
+               for name, x in values.items()}
     followed = {name: log.signals[name] for name in _FOLLOWED if name in log}
     text = json.dumps({"settings": settings, "replica": replica + 1}, sort_keys=True)
     about = Derived("simulate", text, digest_of(log), created(log.recorded))
     name = f"{log.name} simulated" + (f" {replica + 1}" if len(done.q) > 1 else "")
-    return replace(
-        log, name=name, origin="simulated", torque=None, signals=followed | signals, derived=about
-    )
+    return replace(log, name=name, origin="simulated", torque=None, signals=followed | signals,
+                   derived=about)
