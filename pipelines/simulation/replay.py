@@ -80,22 +80,13 @@ class _Followed:
                     return steps // 2
             coarse = fine
         raise InputRejected(
-            "D17",
-            f"{SIMULATION.steps[-1]} steps a sample do not settle the simulation",
-            remedy="friction that changes sign within a very small speed needs a lower sharpness",
-        )
+            "D17", f"{SIMULATION.steps[-1]} steps a sample do not settle the simulation",
+            remedy="friction that changes sign within a very small speed needs a lower sharpness")
 
 
-def simulate_windows(
-    plant: Plant,
-    motion: Motion,
-    tau: Array,
-    sample_time: float,  # noqa: PLR0913
-    length: int,
-    usable: Mask | None = None,
-    share: float = 0.0,
-    steps: int | None = None,
-) -> Windows:
+def simulate_windows(plant: Plant, motion: Motion, tau: Array, sample_time: float,  # noqa: PLR0913
+                     length: int, usable: Mask | None = None, share: float = 0.0,
+                     steps: int | None = None) -> Windows:
     """Follow `tau` (samples, joints) from the motion's state at the start of every window.
 
     Args:
@@ -125,7 +116,7 @@ def simulate_windows(
         steps = followed.steps(first[np.linspace(0, len(first) - 1, count).astype(int)], share)
     q, dq = np.full((2, *motion.q.shape), np.nan)
     for begin in range(0, len(first), SIMULATION.windows_together):
-        some = first[begin : begin + SIMULATION.windows_together]
+        some = first[begin:begin + SIMULATION.windows_together]
         rows = (some[:, None] + np.arange(length)).ravel()
         moved = followed.states(some, steps)
         q[rows], dq[rows] = (part.reshape(len(rows), -1) for part in np.split(moved, 2, axis=2))
