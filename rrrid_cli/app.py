@@ -39,7 +39,8 @@ __all__ = ["STAGES", "build", "schema_of"]
 LOGS = ("logs", "joints", "session")
 ROLES = ("logs", "identify", "validate", "reference", "joints", "session")
 INPUTS = {"inspect": LOGS, "convert": LOGS, "reconstruct": LOGS, "demo": (), "import": ()}
-INPUTS |= {"simulate": ("replay", "session"), "design-excitation": ("prior_logs", "session")}
+INPUTS |= {"simulate": ("replay", "session"), "export": ("replay", "session")}
+INPUTS |= {"design-excitation": ("prior_logs", "session")}
 INPUTS |= {"compare": ("a", "b"), "report": ("folder",), "schema": ("what",), "doctor": ("quick",)}
 REQUIRED = ("a", "b", "folder", "root")
 # Shared options without effect: they are accepted, and help is silent about them.

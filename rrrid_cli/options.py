@@ -30,7 +30,7 @@ S = TypeVar("S")
 # In the order in which they are needed.
 COMMANDS = ["run", "batch", "demo", "inspect", "import", "convert", "design-excitation"]
 COMMANDS += ["fit-friction", "reconstruct", "estimate-bps", "validate-writing", "frf", "simulate"]
-COMMANDS += ["diagnose", "extend", "compare", "report", "schema", "doctor"]
+COMMANDS += ["diagnose", "extend", "export", "compare", "report", "schema", "doctor"]
 STAGES = tuple(name for name in COMMANDS if name not in ("batch", "report", "schema", "doctor"))
 # What a stage reads by itself. Within `run` it has logs and models from the run, unless the field
 # says `in_run`.
@@ -69,7 +69,8 @@ class Common:
 
 def module_of(command: str) -> str:
     """Return the module of a command's stage; `import` is a word of the language."""
-    return f"pipelines.{'import_log' if command == 'import' else command.replace('-', '_')}"
+    own = {"import": "import_log", "export": "export_model"}  # `export` is a package
+    return f"pipelines.{own.get(command, command.replace('-', '_'))}"
 
 
 def stage_of(command: str) -> Any:

@@ -1,0 +1,155 @@
+"""What an export carries exactly, approximates and loses, with the proof: the result and report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pipelines.dynamics.body import Array
+from pipelines.export.target import Cause
+from pipelines.io.model_file import Validity
+from pipelines.io.results import NOT_STORED
+from pipelines.report.report import Cell, Report, Section, Table, columns_table
+from pipelines.report.sentences import paragraphs, sentence
+from pipelines.report.style import format_number
+
+__all__ = ["Card", "Consistency", "LinkValue", "Proof", "Replay", "card"]
+
+_RANGES = {"speed": "rad/s", "acceleration": "rad/s^2", "posture": "rad", "temperature": "degC"}
+
+
+@dataclass(frozen=True)
+class LinkValue:
+    """A standard parameter of a link, about a frame on its joint."""
+
+    joint: str
+    name: str
+    value: float
+    std: float | None  # of what the logs tell; null where it is not known
+    unit: str
+    origin: str  # "logs", "description", "assumed", or "logs and …"
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """Whether links that could exist have the base parameters."""
+
+    met: bool  # they have; else the file holds the nearest ones
+    distance: float  # [standard deviations] between these and the estimate
+    conflicts: tuple[str, ...]  # joints whose links keep them apart
+    impossible: tuple[str, ...]  # joints whose described links no body could be
+    assumed: tuple[str, ...]  # joints whose links nothing describes
+    cost: Array | None  # [N m] (joints,) torque error rms of the nearest ones
+
+
+@dataclass(frozen=True)
+class Proof:
+    """The exported text, loaded again in its target."""
+
+    program: str
+    states: int
+    relative_error: float  # largest difference of torque by the joint's largest torque
+    says: str  # warnings of the program
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A log under the model and under the exported file: measured minus predicted torque."""
+
+    name: str
+    torque_rms: Array  # [N m] (joints,) measured
+    model_error: Array  # [N m] rms
+    export_error: Array | None  # [N m] rms; null where the target is not installed
+
+
+@dataclass(frozen=True)
+class Card:
+    """An exported model: its files, what they hold, and how that was checked."""
+
+    target: str
+    model: str
+    robot: str
+    joints: tuple[str, ...]
+    units: tuple[str, ...]  # of torque
+    files: tuple[str, ...]
+    causes: tuple[Cause, ...]
+    consistency: Consistency
+    links: tuple[LinkValue, ...]
+    proof: Proof | None  # null where the target is not installed
+    motion: str  # on which approximations are measured
+    torque_rms: Array  # [N m] (joints,) of the model there
+    torque_error: Array | None  # [N m] rms of the exported file's torque minus the model's
+    replays: tuple[Replay, ...]
+    notes: tuple[str, ...]  # what differs from the description
+    validity: Validity | None
+    texts: Mapping[str, str] = field(metadata=NOT_STORED, repr=False)
+    covariance: Array = field(metadata=NOT_STORED, repr=False)
+
+    def count(self, carried: str) -> int:
+        """Return how many causes are carried so."""
+        return sum(cause.carried == carried for cause in self.causes)
+
+
+def card(result: Card) -> Report:
+    """Return the card: causes, proof, links, validity."""
+    good = result.proof is not None and not result.count("lost") and result.consistency.met
+    tables = {
+        "Causes": [_causes(result)],
+        "Proof": _proof(result),
+        "Links": [_links(result)],
+        "Validity": [_validity(result)],
+    }
+    sections = [
+        Section(title, paragraphs("export", title.lower(), result), tuple(own))
+        for title, own in tables.items()
+    ]
+    if result.notes:
+        sections.append(Section("Differences from the description", result.notes))
+    worst = None
+    if result.torque_error is not None:
+        worst = float(np.max(result.torque_error / np.maximum(result.torque_rms, 1e-300)))
+    verdict = sentence("export", "verdict", result, worst)
+    tone = "good" if good else "attention"
+    return Report("Export", verdict, tone, sections=tuple(sections))
+
+
+def _causes(result: Card) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for cause in result.causes:
+        cost = None if cause.cost is None else float(np.max(cause.cost))
+        share = None if cause.share is None else 100.0 * cause.share
+        rows.append((cause.place, cause.carried, cause.how, cost, share))
+    columns = "cause", "carried", "how", "torque error rms [N m]", "of the largest torque [%]"
+    return Table(columns, tuple(rows), keeps_empty=True)
+
+
+def _proof(result: Card) -> list[Table]:
+    shown = {"torque rms": result.torque_rms, "error of the file": result.torque_error}
+    caption = f"Torque of the model on {result.motion}, and how far the file is off [N m]."
+    tables = [_by_joint(result.joints, shown, caption)]
+    for one in result.replays:
+        shown = {"measured, rms": one.torque_rms, "error of the model": one.model_error}
+        shown["error of the file"] = one.export_error
+        tables.append(_by_joint(result.joints, shown, f"The log {one.name}, replayed [N m]."))
+    return tables
+
+
+def _by_joint(joints: Sequence[Cell], shown: Mapping[str, Array | None], caption: str) -> Table:
+    cells = {name: values.tolist() for name, values in shown.items() if values is not None}
+    return columns_table({"joint": joints, **cells}, caption)
+
+
+def _links(result: Card) -> Table:
+    rows = tuple((x.joint, x.name, x.value, x.std, x.unit, x.origin) for x in result.links)
+    return Table(("joint", "parameter", "value", "std", "unit", "from"), rows)
+
+
+def _validity(result: Card) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for key, unit in _RANGES.items():
+        ranges = getattr(result.validity, key, None) or (None,) * len(result.joints)
+        words = (" to ".join(map(format_number, r)) if r is not None else None for r in ranges)
+        rows.append((f"{key} [{unit}]", *words))
+    return Table(("range of the logs", *result.joints), tuple(rows), keeps_empty=True)
