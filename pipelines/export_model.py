@@ -1,6 +1,6 @@
 """Export a model to URDF, MJCF, C99 or JSON, with a card and a proof.
 
-Reads    a model file, its covariance.json where it lies beside it, and logs to replay
+Reads    a model file, the covariance.json in its folder if there is one, and logs to replay
 Writes   the exported file or files, covariance.json of the link parameters, result.json
 Source   Wensing, Kim & Slotine 2018 and Lee, Wensing & Park 2018 (links that could exist)
 
@@ -12,6 +12,7 @@ is loaded again (URDF in Pinocchio, MJCF in MuJoCo, C by the compiler) and its t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,6 +22,8 @@ from pipelines.dynamics.altered import carry_over
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.body import Array, Motion
 from pipelines.errors import Check, InputRejected, UsageError, did_you_mean
+from pipelines.estimation.motion import reconstruct
+from pipelines.estimation.observers import Reconstruction
 from pipelines.export.c_code import C
 from pipelines.export.card import Card, Consistency, LinkValue, Proof, Replay, card
 from pipelines.export.config import EXPORT
@@ -35,12 +38,13 @@ from pipelines.io.model_file import ModelFile, read_covariance, read_model, writ
 from pipelines.io.option import option
 from pipelines.io.output import write_text
 from pipelines.io.schema import joint_unit
-from pipelines.model.motion import Reconstruction, reconstruct
+from pipelines.quality.segments import Mask
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, read_logs
 
 __all__ = ["STAGE", "Card", "Settings", "compute", "read", "report"]
 
+TARGETS: dict[str, Callable[[], Target]]
 TARGETS = {"urdf": lambda: URDF, "mjcf": mjcf, "c": lambda: C, "json": lambda: TABLE}
 
 
@@ -54,7 +58,7 @@ class Settings:
 
 @dataclass(frozen=True, eq=False)
 class _Material:
-    """What the stage reads beside logs."""
+    """Hold the model and what is known of its accuracy."""
 
     model: ModelFile
     arm: Arm
@@ -170,16 +174,16 @@ def _proof(target: Target, held: Held, states: Motion) -> Proof | None:
     return Proof(loaded.program, len(meant), error, loaded.says)
 
 
-def _motion(log: ExperimentLog) -> tuple[Motion, Array]:
+def _motion(log: ExperimentLog) -> tuple[Motion, Mask]:
     """Return the motion of a log, and which samples count."""
     found = reconstruct(log, Reconstruction())
-    good = np.zeros(log.n_samples, dtype=bool)
+    good: Mask = np.zeros(log.n_samples, dtype=bool)
     good[found.good.kept] = found.good.fit
     return found.motion, good & np.isfinite(log.tau).all(axis=1)
 
 
 def _replayed(
-    log: ExperimentLog, motion: Motion, good: Array, arm: Arm, there: Loaded | None
+    log: ExperimentLog, motion: Motion, good: Mask, arm: Arm, there: Loaded | None
 ) -> Replay:
     tau = log.tau
     error = None if there is None else rms((tau - there.torque)[good])
@@ -211,7 +215,8 @@ def _in_links(arm: Arm, flat: Arm) -> tuple[Cause, ...]:
 def _values(links: Links, held: Held) -> tuple[LinkValue, ...]:
     found = []
     for k, (value, std) in enumerate(zip(links.phi.ravel(), links.std, strict=True)):
-        joint, spread = held.joints[k // 10].name, None if np.isnan(std) else float(std)
+        told = "logs" in links.origin[k] and np.isfinite(std)
+        joint, spread = held.joints[k // 10].name, float(std) if told else None
         own = links.names[k], float(value), spread, links.units[k], links.origin[k]
         found.append(LinkValue(joint, *own))
     return tuple(found)

@@ -84,6 +84,8 @@ def _run(module: str, tmp_path: Path, samples: Path) -> Ran:
     if module == "simulate":
         write_log(tmp_path / "waving.h5", controlled_log(400))
         settings, paths = replace(settings, model="rrr"), (tmp_path / "waving.h5",)
+    if module == "export_model":
+        settings, paths = replace(settings, model="rrr"), ()
     if module == "frf":
         settings, paths = replace(settings, high=60.0), (samples / "rrr-healthy/frf-1-1.h5",)
     if module == "run":
@@ -111,7 +113,7 @@ def ran(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 def test_every_stage_is_a_command() -> None:
     """A file directly in pipelines/ is a stage and bears its command's name."""
     assert {_stage(module).name for module in MODULES} == set(STAGES)
-    assert all(_stage(module).name.replace("-", "_") in (module, module.removesuffix("_log")) for module in MODULES)
+    assert all(_stage(module).name.replace("-", "_") in (module, module.removesuffix("_log"), module.removesuffix("_model")) for module in MODULES)
 
 
 @pytest.mark.parametrize("module", MODULES)
@@ -188,7 +190,7 @@ def _examined(folder: Path, out: Path) -> tuple[int, list[Check]]:
     return len(result.logs), [c for c in result.checks if c.level in ("reject", "repair")]
 
 
-@pytest.mark.parametrize("ran", [m for m in MODULES if m not in ("inspect", "run", "frf", "diagnose", "compare")], indirect=True)
+@pytest.mark.parametrize("ran", [m for m in MODULES if m not in ("inspect", "run", "frf", "diagnose", "compare", "export_model")], indirect=True)
 def test_every_log_a_stage_writes_is_in_order(ran: Ran, tmp_path: Path) -> None:
     """`inspect` passes on every log that any stage writes; these stages write some."""
     logs, complaints = _examined(ran[1].folder, tmp_path / "examined")

@@ -28,6 +28,7 @@ LAYERS = {
     "pipelines.estimation.motion_result": 8, "pipelines.estimation.checks": 9,
     "pipelines.model.estimation.result": 10, "pipelines.diagnosis": 11,
     "pipelines.report": 12,
+    "pipelines.export": 12.5,
     "pipelines.stage": 13,
     "pipelines.cache": 14,  # stored results of the stages of a run
     "pipelines": 15,
@@ -43,8 +44,8 @@ CONTRACT = {f"pipelines.effects{end}" for end in ("", ".base", ".config", ".hook
 FILES = ("pipelines.io", "pipelines.importers")
 DOORS: dict[str, str | tuple[str, ...]] = {
     "typer": "rrrid_cli", "matplotlib": "pipelines.report", "jinja2": "pipelines.report", "h5py": FILES,
-    "pandas": FILES, "pyarrow": FILES, "filterpy": "benchmarks.textbook_kalman", "mujoco": "bench",
-    "pinocchio": "nobody", "yaml": "nobody", "pickle": "nobody", "pydantic": FILES, "pydantic_core": FILES,
+    "pandas": FILES, "pyarrow": FILES, "filterpy": "benchmarks.textbook_kalman", "mujoco": ("bench", "pipelines.export"),
+    "pinocchio": "pipelines.export", "yaml": "nobody", "pickle": "nobody", "pydantic": FILES, "pydantic_core": FILES,
     "tomllib": "pipelines.io.sandbox",
     "rich": "rrrid_cli", "pebble": "pipelines.executor", "dask": "pipelines.executor", "distributed": "pipelines.executor",
     "psutil": "pipelines.executor", "packaging": "pipelines.selfcheck",

@@ -117,8 +117,9 @@ def _functions(lines: _Lines) -> Functions:
     def where(condition: str, one: Any, other: Any) -> Any:
         return lines.value(f"{condition} ? {_text(one)} : {_text(other)}")
 
-    plain = (called(name) for name in ("sin", "cos", "tanh", "exp"))
-    return Functions(*plain, sign, called("rint"), called("fmin"), called("fmax"), where)
+    sine, cosine, tanh, exp = map(called, ("sin", "cos", "tanh", "exp"))
+    nearest, smaller, larger = map(called, ("rint", "fmin", "fmax"))
+    return Functions(sine, cosine, tanh, exp, sign, nearest, smaller, larger, where)
 
 
 class _Program:
@@ -229,7 +230,8 @@ def _rotor(o: _Program, acting: Acting, j: int, values: _Values) -> None:
 def _coupling(o: _Program, acting: Acting, j: int, values: _Values) -> None:
     """J ds/dt + B s + C tanh(w s), s = v_j + ρ v_i, on both joints."""
     i = int(values["with_joint"]) - 1
-    ratio = float(acting.effect.simulate(o.held.arm, {**values, "inertia": 1.0}).inertia[j, i])
+    unit = acting.effect.simulate(o.held.arm, {**values, "inertia": 1.0}).inertia
+    ratio = 1.0 if unit is None else float(unit[j, i])
     s, ds = o.v[j] + ratio * o.v[i], o.a[j] + ratio * o.a[i]
     torque = values["inertia"] * ds + values["viscous"] * s
     torque += values["coulomb"] * o.m.tanh(values["sharpness"] * s)

@@ -1,4 +1,4 @@
-"""What an export carries exactly, approximates and loses, with the proof: the result and report."""
+"""Report what an export carries exactly, approximates and loses, with its proof."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pipelines.dynamics.body import Array
 from pipelines.export.target import Cause
 from pipelines.io.model_file import Validity
 from pipelines.io.results import NOT_STORED
-from pipelines.report.report import Cell, Report, Section, Table, columns_table
+from pipelines.report.report import Cell, Report, Section, Table, Tone, columns_table
 from pipelines.report.sentences import paragraphs, sentence
 from pipelines.report.style import format_number
 
@@ -27,14 +27,14 @@ class LinkValue:
     joint: str
     name: str
     value: float
-    std: float | None  # of what the logs tell; null where it is not known
+    std: float | None  # null where the logs tell nothing of it, or no std is known
     unit: str
     origin: str  # "logs", "description", "assumed", or "logs and …"
 
 
 @dataclass(frozen=True)
 class Consistency:
-    """Whether links that could exist have the base parameters."""
+    """The physical consistency of the base parameters."""
 
     met: bool  # they have; else the file holds the nearest ones
     distance: float  # [standard deviations] between these and the estimate
@@ -111,7 +111,7 @@ def card(result: Card) -> Report:
     if result.torque_error is not None:
         worst = float(np.max(result.torque_error / np.maximum(result.torque_rms, 1e-300)))
     verdict = sentence("export", "verdict", result, worst)
-    tone = "good" if good else "attention"
+    tone: Tone = "good" if good else "attention"
     return Report("Export", verdict, tone, sections=tuple(sections))
 
 

@@ -111,7 +111,7 @@ def base_of_standard(body: RigidBody) -> Array:
     ours = body.regressor(*states)
     ours = ours.reshape(-1, ours.shape[2])
     scale = np.linalg.norm(ours, axis=0)
-    theirs = regressor(chain_of(body), *states).reshape(len(ours), -1)
+    theirs = regressor(chain_of(body), states[0], states[1], states[2]).reshape(len(ours), -1)
     found = np.linalg.lstsq(ours / scale, theirs, rcond=None)[0] / scale[:, None]
     found[np.abs(found) < 1e-12 * np.abs(found).max()] = 0.0
     return np.asarray(found)
@@ -237,7 +237,7 @@ def _changes(phi: Array, step: Array) -> Array:
 
 def _pull(prior: Array) -> Array:
     """Return tr(J0⁻¹ M_k) (10 joints,)."""
-    return np.einsum("iab,kba->ik", np.linalg.inv(prior), _PSEUDO).ravel()
+    return np.asarray(np.einsum("iab,kba->ik", np.linalg.inv(prior), _PSEUDO).ravel())
 
 
 def _barrier(phi: Array, pull: Array) -> tuple[Array, Array]:
@@ -257,4 +257,5 @@ def _barrier(phi: Array, pull: Array) -> tuple[Array, Array]:
 def _standard(inertia: Array) -> Array:
     """Return the standard parameters (10 joints,) of pseudo-inertias (joints, 4, 4)."""
     rows = _PSEUDO.reshape(10, 16)
-    return np.linalg.lstsq(rows.T, inertia.reshape(-1, 16).T, rcond=None)[0].T.ravel()
+    found = np.linalg.lstsq(rows.T, inertia.reshape(-1, 16).T, rcond=None)[0]
+    return np.asarray(found.T.ravel())

@@ -43,7 +43,7 @@ def random_states(robot: RobotDescription, validity: Validity | None) -> Motion:
 
 
 def course(robot: RobotDescription, validity: Validity | None) -> Motion:
-    """Return sums of sines, as wide as one limit of each joint allows."""
+    """Return sums of sines, as wide as the limits of each joint allow."""
     rng, t = np.random.default_rng(EXPORT.seed), np.arange(EXPORT.samples) / EXPORT.rate
     w = 2.0 * np.pi * np.arange(1, EXPORT.waves + 1) * EXPORT.rate / EXPORT.samples
     phase = rng.uniform(0.0, 2.0 * np.pi, (robot.n_joints, len(w)))

@@ -62,7 +62,7 @@ class ExportJoint:
 
 @dataclass(frozen=True)
 class JointTerms:
-    """What a target has at a joint besides the link: numbers, zero where there is nothing."""
+    """The terms of a target at a joint besides the link; zero where there is nothing."""
 
     rotor: float = 0.0  # [kg m^2]
     damping: tuple[float, ...] = (0.0, 0.0, 0.0)  # of v, v |v|, v^3
@@ -77,7 +77,7 @@ class JointTerms:
 
 @dataclass(frozen=True)
 class Cause:
-    """What became of one cause of the model."""
+    """The fate of one cause of the model."""
 
     place: str  # "cogging:2"
     carried: str  # "exactly", "approximated" or "lost"
@@ -97,7 +97,7 @@ class Loaded:
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """What a target holds of an arm."""
+    """An arm as a target holds it."""
 
     name: str
     root: str
@@ -116,7 +116,7 @@ class Held:
         """Return what the exported file should show: carried causes, and those fitted."""
         fitted = np.einsum("skj,jk->sj", _speed_columns(motion.dq), self.fits)
         gains = [term.gain for term in self.terms]
-        return target.seen(self.arm).torque(motion) + fitted / gains
+        return np.asarray(target.seen(self.arm).torque(motion) + fitted / gains)
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ def numbers(values: Array | tuple[float, ...]) -> str:
 def _rpy(r: Array) -> Array:
     """Return roll, pitch, yaw with R = Rz(yaw) Ry(pitch) Rx(roll).
 
-    Roll is read off what is left of R after the yaw, so that near a pitch of ±90°, where both turn
+    Roll is read off R without the yaw, so that near a pitch of ±90°, where both turn
     about one axis, the one makes up for rounding in the other.
     """
     yaw = math.atan2(r[1, 0], r[0, 0])

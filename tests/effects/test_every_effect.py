@@ -23,10 +23,10 @@ UNITS = {"1", "1/rev", "Hz", "s", "s/rad", "rad", "rad/s", "m", "kg", "kg m", "k
          "N m/rad", "N m/rad^2", "N m/rad^3", "N m/rad^4",
          "N m/rad^5", "N m/rad^6", "N m/rad^7", "N m s^2/rad^2"}
 REPO = Path(__file__).resolve().parents[2]
-# Where names of effects stand all the same: the laws among which friction is fitted and their report, the nominal model, and what
-# a frequency response tells apart without any motion.
+# Where names of effects stand all the same: the laws among which friction is fitted and their report, the nominal model, what a
+# frequency response tells apart without any motion, and the forms of other programs, which have terms of their own.
 MAY_NAME = ("pipelines/model/friction/", "pipelines/report/friction_report.py", "pipelines/model/estimation/nominal.py",
-            "pipelines/frequency/")
+            "pipelines/frequency/", "pipelines/export/")
 NOMINAL = {"coulomb", "viscous", "two_sigmoid", "three_sigmoid"}  # laws that a nominal model has
 FOLDER = REPO / "pipelines" / "effects"
 
