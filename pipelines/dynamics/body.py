@@ -87,12 +87,9 @@ class TorqueParts:
 
 
 def refuse_other_shapes(columns: int, **states: Array) -> None:
-    """Refuse arrays that are not (samples, columns), all with as many samples.
+    """Refuse arrays by their names that are not (samples, columns), all with as many samples.
 
     A 1-D q would else give nonsense.
-
-    Args:
-        states: the arrays by their names.
 
     Raises:
         ValueError: says which array, the shape it has and the shape it must have.
@@ -104,19 +101,17 @@ def refuse_other_shapes(columns: int, **states: Array) -> None:
             raise ValueError(f"{name} has the shape {shape}, wanted is (samples, {columns})")
         samples = shape[0] if samples is None else samples
         if shape[0] != samples:
-            raise ValueError(
-                f"{name} has the shape {shape}, wanted is {(samples, columns)}, as before it")
+            wanted = (samples, columns)
+            raise ValueError(f"{name} has the shape {shape}, wanted is {wanted}, as before it")
 
 
-def refuse_other_length(parameters: int, p: Array, samples: int | None = None) -> None:
+def refuse_other_length(parameters: int, p: Array) -> None:
     """Refuse p that is not (parameters,).
-
-    Where every sample may have its own arm, (samples, parameters) is allowed too.
 
     Raises:
         ValueError: says the shape it has and the shape it must have.
     """
-    if np.shape(p) not in ((parameters,), (samples, parameters)):
+    if np.shape(p) != (parameters,):
         raise ValueError(f"p has the shape {np.shape(p)}, wanted is ({parameters},)")
 
 

@@ -115,7 +115,7 @@ class RRR:
         shape = np.shape(q)[:-1]
         R = np.zeros((3, 15, *shape))
         angles, v, u = (np.moveaxis(np.asarray(x, dtype=np.float64), -1, 0) for x in (q, dq, ddq))
-        trigonometry = self._trigonometry_of(angles[1], angles[2])
+        trigonometry = self._trigonometry(angles[1], angles[2])
         doubled = _doubled(trigonometry)
         self._fill_waist_row(R[0], trigonometry, doubled, v, u)
         self._fill_other_rows(R[1], R[2], trigonometry, doubled, v, u)
@@ -133,7 +133,7 @@ class RRR:
         """
         angles, v, u = (np.ascontiguousarray(np.transpose(x), dtype=np.float64)
                         for x in (q, dq, ddq))
-        trigonometry = self._trigonometry_of(angles[1], angles[2])
+        trigonometry = self._trigonometry(angles[1], angles[2])
         waist, two, three = out[:11], out[11:25], out[21:28]
         doubled = _doubled(trigonometry)
         self._fill_waist_row(waist, trigonometry, doubled, v, u)
@@ -191,32 +191,23 @@ class RRR:
         np.add(u2, u3, out=three[12])
 
     def torque(self, q: Array, dq: Array, ddq: Array, p: Array) -> Array:
-        """τ (samples, 3) [N m].
-
-        `p` is (15,), or (samples, 15) where every sample has its own arm.
-        """
-        parts = self.torque_parts(q, dq, ddq, p)
-        return parts.inertia + parts.coriolis + parts.gravity
+        """τ = R p (samples, 3) [N m]."""
+        refuse_other_length(15, p)
+        return np.asarray(self.regressor(q, dq, ddq) @ p)
 
     def torque_parts(self, q: Array, dq: Array, ddq: Array, p: Array) -> TorqueParts:
-        """D(q) ddq, c(q, dq) and h(q): the terms of (A5) gathered by what they multiply."""
-        refuse_other_shapes(3, q=q, dq=dq, ddq=ddq)
-        refuse_other_length(15, p, len(q))
-        trigonometry = self._trigonometry(q)
-        D11, D12, D13, D22, D23, D33 = self._mass(trigonometry, p)
-        u1, u2, u3 = np.moveaxis(ddq, -1, 0)
-        inertia = np.stack([D11 * u1 + D12 * u2 + D13 * u3, D12 * u1 + D22 * u2 + D23 * u3,
-                            D13 * u1 + D23 * u2 + D33 * u3], axis=-1)
-        return TorqueParts(inertia, self._coriolis(trigonometry, dq, p),
-                           self._gravity(trigonometry, p))
+        """D(q) ddq, c(q, dq) and h(q): what is left of τ with the others at rest."""
+        rest = np.zeros_like(q)
+        gravity = self.torque(q, rest, rest, p)
+        return TorqueParts(self.torque(q, rest, ddq, p) - gravity,
+                           self.torque(q, dq, rest, p) - gravity, gravity)
 
     def mass_matrix(self, q: Array, p: Array) -> Array:
-        """D(q) (samples, 3, 3) [kg m^2]."""
-        refuse_other_shapes(3, q=q)
-        refuse_other_length(15, p, len(q))
-        D11, D12, D13, D22, D23, D33 = np.broadcast_arrays(*self._mass(self._trigonometry(q), p))
-        entries = np.stack([D11, D12, D13, D12, D22, D23, D13, D23, D33], axis=-1)
-        return entries.reshape(*entries.shape[:-1], 3, 3)
+        """D(q) (samples, 3, 3) [kg m^2]: what unit accelerations take."""
+        rest = np.zeros_like(q)
+        gravity = self.torque(q, rest, rest, p)
+        columns = [self.torque(q, rest, rest + unit, p) - gravity for unit in np.eye(3)]
+        return np.stack(columns, axis=-1)
 
     def known_parameters(self) -> Array | None:
         """Return p (15,) of the links of the description; None where it does not know them all."""
@@ -226,60 +217,14 @@ class RRR:
         terms = combined(self.robot) * standard_parameters(links)
         return np.array([math.fsum(row) for row in terms])  # to the last bit on any processor
 
-    def _trigonometry(self, q: Array) -> tuple[Array, ...]:
+    def _trigonometry(self, q2: Array, q3: Array) -> tuple[Array, ...]:
         """cos and sin of q2, q3 and S.
 
         Those of S follow by the addition theorem, which costs a third of two more calls.
         """
-        return self._trigonometry_of(q[..., 1], q[..., 2])
-
-    def _trigonometry_of(self, q2: Array, q3: Array) -> tuple[Array, ...]:
         q2, q3 = q2 + self._offset[1], q3 + self._offset[2]
         c2, s2, c3, s3 = np.cos(q2), np.sin(q2), np.cos(q3), np.sin(q3)
         return c2, s2, c3, s3, c2 * c3 - s2 * s3, s2 * c3 + c2 * s3
-
-    def _mass(self, trigonometry: tuple[Array, ...], p: Array) -> tuple[Array, ...]:
-        """D11, D12, D13, D22, D23, D33: what multiplies ddq in (A5).
-
-            D11 = p1 c2^2 + p2 s2 c2 + 2 a2 c2 (p3 cS - p4 sS) + p5 cS^2 - p6 sS cS + p7
-            D13 = p8 cS + p9 sS;  D12 = D13 + p10 c2 + p11 s2
-            D22 = p12 + 2 a2 (p3 c3 - p4 s3);  D23 = p13 + a2 (p3 c3 - p4 s3);  D33 = p13
-        """
-        c2, s2, c3, s3, cS, sS = trigonometry
-        p1, p2, p3, p4, p5, p6, p7, p8, p9, p10, p11, p12, p13, _, _ = np.moveaxis(
-            np.asarray(p), -1, 0)
-        D11 = (p1 * c2 + p2 * s2 + 2 * self._a2 *
-               (p3 * cS - p4 * sS)) * c2 + (p5 * cS - p6 * sS) * cS + p7
-        D13 = p8 * cS + p9 * sS
-        bent = self._a2 * (p3 * c3 - p4 * s3)
-        return D11, D13 + p10 * c2 + p11 * s2, D13, p12 + 2 * bent, p13 + bent, p13
-
-    def _coriolis(self, trigonometry: tuple[Array, ...], dq: Array, p: Array) -> Array:
-        """c(q, dq): what is left of (A5) without ddq and g."""
-        c2, s2, c3, s3, cS, sS = trigonometry
-        v1, v2, v3 = np.moveaxis(dq, -1, 0)
-        p1, p2, p3, p4, p5, p6, _, p8, p9, p10, p11, _, _, _, _ = np.moveaxis(np.asarray(p), -1, 0)
-        a2, v, half = self._a2, v2 + v3, 0.5 * v1**2
-        sin22, cos22, sin2S, cos2S, sin223, cos223 = _doubled(trigonometry)
-        upper, fore, both = p1 * sin22 - p2 * cos22, p5 * sin2S + p6 * cos2S, a2 * (p3 * sin223
-                                                                                    + p4 * cos223)
-        bent = a2 * (p3 * s3 + p4 * c3)
-        return np.stack([
-            -v1 * (v2 * (upper + 2 * both) + v * fore + v3 * (2 * a2 * c2) * (p3 * sS + p4 * cS))
-            + v**2 * (p9 * cS - p8 * sS) + v2**2 * (p11 * c2 - p10 * s2),
-            half * (upper + fore + 2 * both) - (v3 + 2 * v2) * v3 * bent,
-            half * (fore + both + bent) + v2**2 * bent,
-        ], axis=-1)
-
-    def _gravity(self, trigonometry: tuple[Array, ...], p: Array) -> Array:
-        """h(q): h3 = g (p3 cS - p4 sS);  h2 = h3 + g (p14 c2 - p15 s2).
-
-        And h1 = 0, for the first axis is vertical.
-        """
-        c2, s2, _, _, cS, sS = trigonometry
-        p3, p4, p14, p15 = np.moveaxis(np.asarray(p)[..., [2, 3, 13, 14]], -1, 0)
-        h3 = self._g * (p3 * cS - p4 * sS)
-        return np.stack([np.zeros_like(h3), h3 + self._g * (p14 * c2 - p15 * s2), h3], axis=-1)
 
 
 def _doubled(trigonometry: tuple[Array, ...]) -> tuple[Array, ...]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-import pytest
 
 from pipelines.dynamics.base_parameters import BaseArm
 from pipelines.dynamics.body import RigidBody
@@ -73,8 +72,3 @@ def test_work_done_is_energy_gained() -> None:
     gained = energy(body, q, dq) @ p
     done = work(q, body.torque(q, dq, ddq, p))
     assert np.abs(done - (gained - gained[0])).max() < 1e-5 * np.ptp(gained)
-
-
-def test_an_unknown_body_is_refused() -> None:
-    with pytest.raises(TypeError, match="potential energy"):
-        potential_energy(object(), np.zeros((1, 3)))  # type: ignore[arg-type]
