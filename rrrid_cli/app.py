@@ -90,6 +90,20 @@ class Batch:
     backend: str = option("local", "local, or dask://HOST:PORT: a Dask scheduler.")
     joints: tuple[int, ...] = option((), "Joints to take of every log: 1,3. --robot is theirs.")
 
+    def __post_init__(self) -> None:
+        for flag, value, possible, remedy in (
+            ("--jobs", self.jobs, self.jobs is None or self.jobs > 0, "give 1 or more"),
+            ("--timeout", self.timeout, (self.timeout or 1.0) > 0.0, "give seconds"),
+            (
+                "--on-error",
+                self.on_error,
+                self.on_error in ("continue", "abort"),
+                "give one of both",
+            ),
+        ):
+            if not possible:
+                raise UsageError("C02", f"'{value}' is not possible", flag, remedy)
+
 
 def build(word: str) -> typer.Typer:
     """Return the application; the command `word` alone has its options, and its stage loaded."""
@@ -284,10 +298,10 @@ def _demo(name: str, given: Mapping[str, Any]) -> int:
         raise
     if not common.quiet:
         report = outcome.folder / "report.html"
-        print(*demo.ending(recorded.result, outcome.result.diagnosis), sep="\n", file=words)
-        print(f"Report:     {report if report.exists() else 'none was asked for'}", file=words)
-        print("Next:       rrrid run FOLDER, on logs of your own;", end=" ", file=words)
-        print("rrrid import --guess FILE drafts what makes logs of recordings", file=words)
+        lines = demo.ending(recorded.result, outcome.result.diagnosis)
+        lines = (*lines, f"Report:     {report if report.exists() else 'none was asked for'}")
+        next_ = "rrrid run FOLDER, on logs of your own; rrrid import --guess FILE drafts"
+        print(*lines, f"Next:       {next_} what makes logs of recordings", sep="\n", file=words)
     return outcome.exit_code
 
 
@@ -300,14 +314,7 @@ def _batch(name: str, given: Mapping[str, Any]) -> int:
     from pipelines.io.processors import processors
     from pipelines.stage import Request
 
-    for flag, value, possible, remedy in (
-        ("--jobs", own.jobs, own.jobs is None or own.jobs > 0, "give 1 or more"),
-        ("--timeout", own.timeout, own.timeout is None or own.timeout > 0.0, "give seconds"),
-        ("--on-error", own.on_error, own.on_error in ("continue", "abort"), "continue or abort"),
-    ):
-        if not possible:
-            raise UsageError("C02", f"'{value}' is not possible", where=flag, remedy=remedy)
-    module, values = module_of(own.stage), vars(common) | vars(own)
+    values = vars(common) | vars(own)
     settings = make_settings(own.stage, common.config, common.set, {})
     request = Request((), **_fields_of(Request, values | {"out": None}))
     values |= {
@@ -317,17 +324,14 @@ def _batch(name: str, given: Mapping[str, Any]) -> int:
         "abort": own.on_error == "abort",
         "shard": read_shard(own.shard),
     }
-    progress = console.Progress(common)
-    with progress:
-        plan = Plan(module, settings, request, **_fields_of(Plan, values))
+    with (progress := console.Progress(common)):
+        plan = Plan(module_of(own.stage), settings, request, **_fields_of(Plan, values))
         outcome = run_batch(plan, progress)
     console.print_outcome(outcome, common)
     failing = [(item.name, item.error) for item in outcome.result.items if item.error is not None]
-    for name, one in failing[:_MOST_ERRORS]:
-        code, where = (
-            one.code.removeprefix("RRID-"),
-            f"{name}: {one.where}".removesuffix(f": {name}"),
-        )
+    for item, one in failing[:_MOST_ERRORS]:
+        where = f"{item}: {one.where}".removesuffix(f": {item}")
+        code = one.code.removeprefix("RRID-")
         console.print_error(RrridError(code, one.message, where, one.remedy))
     return outcome.exit_code
 
@@ -336,8 +340,7 @@ def read_shard(text: str | None) -> tuple[int, int]:
     """Return "2/4" as (2, 4); (1, 1) where nothing was said."""
     found = re.fullmatch(r"([0-9]{1,8})/([0-9]{1,8})", text or "1/1")
     if not found or not 1 <= int(found[1]) <= int(found[2]):
-        message, remedy = f"'{text}' is no shard", "write I/N, from 1/N to N/N"
-        raise UsageError("C02", message, where="--shard", remedy=remedy)
+        raise UsageError("C02", f"'{text}' is no shard", "--shard", "write I/N, from 1/N to N/N")
     return int(found[1]), int(found[2])
 
 
@@ -348,8 +351,8 @@ def _bytes(text: str | None) -> int | None:
     found = re.fullmatch(r"(\d+(?:\.\d+)?)([KMGT]?)I?B?", text.strip().upper())
     size = float(found[1]) * 1024 ** " KMGT".index(found[2] or " ") if found else 0.0
     if not 1 << 20 <= size < 1 << 50:
-        message, remedy = f"'{text}' is no amount of memory", "write for example 500M or 2G"
-        raise UsageError("C02", message, where="--memory", remedy=remedy)
+        message = f"'{text}' is no amount of memory"
+        raise UsageError("C02", message, "--memory", "write for example 500M or 2G")
     return int(size)
 
 
@@ -406,13 +409,15 @@ def schema_of(what: str) -> dict[str, Any]:
     from pipelines.report.batch_report import Result
     from pipelines.stage import result_type
 
-    known = ("model", "log", "batch", *STAGES)
-    if what not in known:
-        message = f"no schema of '{what}'{did_you_mean(what, known)}"
-        raise UsageError("C02", message, where="schema", remedy=f"one of: {', '.join(known)}")
     if what in ("model", "log"):
         return model_schema() if what == "model" else log_schema()
-    return result_schema(Result if what == "batch" else result_type(stage_of(what)), what)
+    if what == "batch":
+        return result_schema(Result, what)
+    if what in STAGES:
+        return result_schema(result_type(stage_of(what)), what)
+    known = ("model", "log", "batch", *STAGES)
+    message = f"no schema of '{what}'{did_you_mean(what, known)}"
+    raise UsageError("C02", message, "schema", f"one of: {', '.join(known)}")
 
 
 ACTIONS = {"run": _run, "import": _import, "demo": _demo}  # any other stage: _stage

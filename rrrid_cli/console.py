@@ -20,15 +20,6 @@ if TYPE_CHECKING:
     from pipelines.stage import Outcome
     from rrrid_cli.options import Common
 
-__all__ = [
-    "Progress",
-    "print_checks",
-    "print_error",
-    "print_outcome",
-    "print_table",
-    "print_verdict",
-]
-
 SIGNS = {"ok": "·", "warn": "!", "repair": "~", "reject": "x", "bad": "x"}
 # Values; p3 and q_1 are names.
 VALUES = re.compile(r"(?<![A-Za-z_])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![A-Za-z_])")
@@ -52,28 +43,27 @@ class Progress:
     def __enter__(self) -> None:
         if self.quiet:
             return
-        if sys.stderr.isatty() and not self.verbose:
-            from rich.console import Console
-            from rich.progress import Progress as Bar
-            from rich.progress import TextColumn, TimeElapsedColumn
-
-            columns = (TextColumn("{task.description}", markup=False), TimeElapsedColumn())
-            self.bar = Bar(
-                *columns, console=Console(stderr=True), transient=True, refresh_per_second=2
-            )
-            self.task = self.bar.add_task(self.step, total=None)
-            self.bar.start()
-        else:
+        if not sys.stderr.isatty() or self.verbose:
             self.over.clear()
             self.clock = threading.Thread(target=self._repeat, daemon=True)
             self.clock.start()
+            return
+        from rich.console import Console
+        from rich.progress import Progress as Bar
+        from rich.progress import TextColumn, TimeElapsedColumn
+
+        columns = (TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+        console = Console(stderr=True)
+        self.bar = Bar(*columns, console=console, transient=True, refresh_per_second=2)
+        self.task = self.bar.add_task(self.step, total=None)
+        self.bar.start()
 
     def __call__(self, step: str) -> None:
         self.step, self.begun = clean(step, 100), time.monotonic()
         if self.bar is not None:
             self.bar.reset(self.task, description=self.step)
         elif self.verbose:
-            print(self.step, file=sys.stderr, flush=True)
+            self._print(self.step)
 
     def __exit__(self, *_: object) -> None:
         self.over.set()
@@ -85,9 +75,10 @@ class Progress:
 
     def _repeat(self) -> None:
         while not self.over.wait(self.silence):
-            print(
-                f"{self.step}, {time.monotonic() - self.begun:.0f} s", file=sys.stderr, flush=True
-            )
+            self._print(f"{self.step}, {time.monotonic() - self.begun:.0f} s")
+
+    def _print(self, words: str) -> None:
+        print(words, file=sys.stderr, flush=True)
 
 
 def print_outcome(outcome: Outcome[Any], options: Common) -> None:
@@ -120,18 +111,17 @@ def _print_key_figures(table: Table, stream: TextIO | None) -> None:
     from pipelines.report.report import column_texts, filled
     from pipelines.report.style import format_number, format_unit
 
-    table, head = filled(table), []
-    columns: list[Sequence[str]] = []
-    for name, cells in zip(table.columns, zip(*table.rows, strict=True), strict=bool(table.rows)):
+    table = filled(table)
+    if len(table.columns) <= 2:  # a figure is not like the one below it  # noqa: PLR2004
+        rows = [[c if isinstance(c, str) else format_number(c) for c in row] for row in table.rows]
+        print_table([], [[clean(cell, 60) for cell in row] for row in rows], stream)
+        return
+    head = []
+    for name in table.columns:
         title, bracket, unit = name.rpartition("[")
         head.append(f"{title}[{format_unit(unit)}" if bracket else unit)
-        columns.append(column_texts(cells, lambda text: clean(text, 60)))
-    if len(table.columns) <= 2:  # a figure is not like the one below it  # noqa: PLR2004
-        head = []
-        columns = [
-            [clean(cell, 60) if isinstance(cell, str) else format_number(cell) for cell in cells]
-            for cells in zip(*table.rows, strict=True)
-        ]
+    cells = zip(*table.rows, strict=True)
+    columns = [column_texts(own, lambda text: clean(text, 60)) for own in cells]
     print_table(head, list(zip(*columns, strict=True)), stream)
 
 
@@ -197,13 +187,9 @@ def _places(group: Sequence[Check], most: int = 30) -> str:
     logs = list(dict.fromkeys(check.where.split(", ")[0] for check in group if check.where))
     joints = sorted({int(n) for check in group for n in re.findall(r", joint (\d+)", check.where)})
     text = f"alike {len(group)} times in all"
-    if logs:
-        text += f", in {', '.join(logs[:most])}"
-    if len(logs) > most:
-        text += f" and {len(logs) - most} more"
-    if len(joints) > 1:
-        text += f"; joints {', '.join(map(str, joints))}"
-    return text
+    text += f", in {', '.join(logs[:most])}" if logs else ""
+    text += f" and {len(logs) - most} more" if len(logs) > most else ""
+    return f"{text}; joints {', '.join(map(str, joints))}" if len(joints) > 1 else text
 
 
 def print_error(problem: RrridError, most: int = 12) -> None:

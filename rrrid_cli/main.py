@@ -11,8 +11,9 @@ import re
 import signal
 import sys
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn, TextIO
@@ -20,7 +21,7 @@ from typing import Any, NoReturn, TextIO
 import typer
 
 from pipelines.errors import EnvironmentFault, Interrupted, RrridError, UsageError, did_you_mean
-from pipelines.io.output import fault_of
+from pipelines.io.output import fault_of, renamed
 from rrrid_cli.app import build
 from rrrid_cli.console import print_error
 
@@ -28,6 +29,7 @@ __all__ = ["call", "entry"]
 
 # What a character becomes where an encoding lacks it; any other its closest ASCII letters.
 PLAIN = '→:-> ·:- −:- ×:x ≤:<= ≥:>= ±:+- ∞:inf τ:tau Φ:Phi “:" ”:" ’:\''
+_SIGNALS = (signal.SIGTERM, signal.SIGINT)
 
 
 def economise() -> None:
@@ -47,28 +49,26 @@ def entry() -> NoReturn:
         heard.append(number)
         raise Interrupted(number)
 
-    signal.signal(signal.SIGTERM, interrupt)
-    signal.signal(signal.SIGINT, interrupt)
+    for number in _SIGNALS:
+        signal.signal(number, interrupt)
     sys.unraisablehook = _raise_again
     words = sys.argv[1:]
-    _prepare_streams("--json" in words)
+    as_json = "--json" in words
+    _prepare_streams(as_json)
     try:
         code = _exit_code(words)
-    except BrokenPipeError:
-        _discard(
-            sys.stdout, sys.stderr
-        )  # the reader of a pipe has left: without a second complaint at exit
+    except BrokenPipeError:  # the reader of a pipe has left: without a second complaint at exit
+        _discard(sys.stdout, sys.stderr)
         code = 0
     except (Exception, Interrupted) as caught:
         _ignore_signals()
-        # a library in whose call the signal came may have made another error of it
-        problem = Interrupted(heard[0]) if heard else caught
         if "--debug" in words:
             raise
-        error = _as_error(problem, words)
+        # a library in whose call the signal came may have made another error of it
+        error = Interrupted(heard[0]).as_error() if heard else _as_error(caught, words)
         code = error.exit_code
-        _print_error(error, "--json" in words)
-        if isinstance(problem, Interrupted):
+        _print_error(error, as_json)
+        if heard:
             _leave(code)
     _ignore_signals()
     sys.exit(code)
@@ -120,15 +120,11 @@ def _usage_error(problem: typer.TyperException, called: str) -> UsageError:
         if found[1] == "option":
             known = [name for one in context.command.get_params(context) for name in one.opts]
         text, code = f"no such {found[1]} '{found[2]}'{did_you_mean(found[2], known)}", "C01"
-    return UsageError(
-        code, f"{text[0].lower()}{text[1:]}", where=where, remedy=f"see '{where} --help'"
-    )
+    return UsageError(code, f"{text[0].lower()}{text[1:]}", where, f"see '{where} --help'")
 
 
 def _as_error(problem: BaseException, words: Iterable[str]) -> RrridError:
     """Return what ended a command as an error with a code, a place and a remedy."""
-    if isinstance(problem, Interrupted):
-        return problem.as_error()
     if isinstance(problem, OSError):
         problem = fault_of(problem, Path("standard output"))
     if not isinstance(problem, RrridError):
@@ -136,37 +132,22 @@ def _as_error(problem: BaseException, words: Iterable[str]) -> RrridError:
     try:
         os.getcwd()
     except FileNotFoundError:  # relative paths mean nothing
-        if isinstance(problem, EnvironmentFault):
-            return EnvironmentFault(
-                "P02",
-                "the folder that the command was called in was deleted",
-                where="working folder",
-                remedy="call it from a folder that exists (cd)",
-            )
-        return problem
-    return _as_given(problem, words)
-
-
-def _as_given(problem: RrridError, words: Iterable[str]) -> RrridError:
-    """Return the error with every path as the command line gave it; stages have absolute paths."""
-    from pipelines.io.output import renamed
-
-    names: dict[str, str] = {}
-    for text in (
-        part
-        for word in words
-        for part in (word, word.partition("=")[2])
-        if part and not part.startswith("-")
-    ):
+        if not isinstance(problem, EnvironmentFault):
+            return problem
+        what, remedy = "the folder that the command was called in", "call it from another (cd)"
+        return EnvironmentFault("P02", f"{what} was deleted", "working folder", remedy)
+    names: dict[
+        str, str
+    ] = {}  # absolute paths, as stages have them -> as the command line has them
+    for text in (part for word in words for part in (word, word.partition("=")[2])):
         path = Path(text)
-        for one in () if path.is_absolute() else (path, *path.parents):
-            if one == path or one != Path():
+        if text and not text.startswith("-") and not path.is_absolute():
+            for one in (path, *(above for above in path.parents if above != Path())):
                 names.setdefault(str(one.absolute()), str(one))
                 names.setdefault(os.path.abspath(one), str(one))
     for each in (problem, *problem.others):
-        each.where, each.message, each.remedy = (
-            renamed(text, names) for text in (each.where, each.message, each.remedy)
-        )
+        each.where, each.message = renamed(each.where, names), renamed(each.message, names)
+        each.remedy = renamed(each.remedy, names)
     return problem
 
 
@@ -175,16 +156,12 @@ def _internal(problem: BaseException) -> RrridError:
     import tempfile
     import traceback
 
-    with tempfile.NamedTemporaryFile(
-        "w", prefix="rrrid-crash-", suffix=".txt", delete=False, encoding="utf-8"
-    ) as file:
+    handle, name = tempfile.mkstemp(prefix="rrrid-crash-", suffix=".txt")
+    with open(handle, "w", encoding="utf-8", errors="replace") as file:
         file.write(f"{' '.join(sys.argv)}\n\n")
         traceback.print_exception(problem, file=file)
-    return RrridError(
-        "Z70",
-        f"internal error: {type(problem).__name__}: {problem}",
-        remedy=f"please report it with {file.name}",
-    )
+    words = f"internal error: {type(problem).__name__}: {problem}"
+    return RrridError("Z70", words, remedy=f"please report it with {name}")
 
 
 def _print_error(error: RrridError, as_json: bool) -> None:
@@ -197,10 +174,10 @@ def _print_error(error: RrridError, as_json: bool) -> None:
         if as_json:
             from pipelines.io.results import json_text
 
-            others = {"others": [other.as_dict() for other in error.others]} if error.others else {}
-            sys.stdout.write(
-                json_text({"error": error.as_dict(), "exit": error.exit_code, **others})
-            )
+            told: dict[str, Any] = {"error": error.as_dict(), "exit": error.exit_code}
+            if error.others:
+                told["others"] = [other.as_dict() for other in error.others]
+            sys.stdout.write(json_text(told))
         sys.stdout.flush()
     except OSError:
         _discard(sys.stdout)
@@ -214,7 +191,7 @@ def _discard(*streams: TextIO) -> None:
 
 def _ignore_signals() -> None:
     """Let no signal end the last words in a traceback."""
-    for number in (signal.SIGTERM, signal.SIGINT):
+    for number in _SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 
 
@@ -233,9 +210,7 @@ def _raise_again(lost: Any) -> None:
         import threading
 
         threading.Timer(0.01, os.kill, (os.getpid(), lost.exc_value.exit_code - 128)).start()
-    elif "h5py" not in str(
-        lost.object
-    ):  # what a full disk makes of HDF5's objects, after the error that was printed
+    elif "h5py" not in str(lost.object):  # a full disk, after the error that was printed
         sys.__unraisablehook__(lost)
 
 
@@ -250,28 +225,23 @@ def _prepare_streams(as_json: bool) -> None:
             if null != number:  # a later file must not take the number
                 os.dup2(null, number)
             setattr(sys, name, open(number, "r" if number == 0 else "w", encoding="utf-8"))  # noqa: SIM115
-    codecs.register_error("rrrid-json", _escape)
-    codecs.register_error("rrrid-plain", _simplify)
-    for stream, errors in (
-        (sys.stdout, "rrrid-json" if as_json else "rrrid-plain"),
-        (sys.stderr, "rrrid-plain"),
-    ):
-        if (change := getattr(stream, "reconfigure", None)) is not None:
-            change(errors=errors)
+    for name, change in (("json", lambda text: json.dumps(text)[1:-1]), ("plain", _simplified)):
+        codecs.register_error(f"rrrid-{name}", partial(_replaced, change))
+    for stream in (sys.stdout, sys.stderr):
+        if (configure := getattr(stream, "reconfigure", None)) is not None:
+            configure(errors="rrrid-json" if as_json and stream is sys.stdout else "rrrid-plain")
 
 
-def _escape(problem: UnicodeError) -> tuple[str, int]:
-    """Return the characters that an encoding lacks as JSON escapes."""
-    assert isinstance(problem, UnicodeEncodeError)
-    return json.dumps(problem.object[problem.start : problem.end])[1:-1], problem.end
+def _replaced(change: Callable[[str], str], problem: Any) -> tuple[str, int]:
+    """Return others for the characters that an encoding lacks, and where they end."""
+    return change(problem.object[problem.start : problem.end]), problem.end
 
 
-def _simplify(problem: UnicodeError) -> tuple[str, int]:
-    """Return similar characters for those that an encoding lacks."""
-    assert isinstance(problem, UnicodeEncodeError)
-    missing = unicodedata.normalize("NFKD", problem.object[problem.start : problem.end])
+def _simplified(text: str) -> str:
+    """Return similar characters that every encoding has."""
     plain = dict(pair.split(":") for pair in PLAIN.split())
-    return "".join(plain.get(sign, sign if sign.isascii() else "") for sign in missing), problem.end
+    signs = unicodedata.normalize("NFKD", text)
+    return "".join(plain.get(sign, sign if sign.isascii() else "") for sign in signs)
 
 
 if __name__ == "__main__":
