@@ -47,7 +47,9 @@ from pipelines import fit_friction
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.base_parameters import BaseArm
 from pipelines.dynamics.body import Motion
+from pipelines.estimation.estimate import Recipe, fit_logs
 from pipelines.estimation.motion import Reconstruction, reconstruct
+from pipelines.estimation.nominal import nominal_columns
 from pipelines.excitation.optimise import landscape
 from pipelines.excitation.problem import DesignProblem
 from pipelines.excitation.regressor import grams_of
@@ -56,8 +58,6 @@ from pipelines.io.files import open_log, write_log
 from pipelines.io.robot import format_robot
 from pipelines.io.robot_files import load_robot
 from pipelines.io.urdf import import_urdf
-from pipelines.model.estimation.logs import Recipe, fit_logs
-from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.simulation.fourier_series import FourierSeries
 from pipelines.stage import Request, run_stage
 from tests.excitation.test_gradient import SHARP, TASKS, WEIGHT, _complex_value, _problem

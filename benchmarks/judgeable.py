@@ -20,7 +20,7 @@ from pipelines import diagnose
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.errors import RrridError
 from pipelines.estimation.checks.gates import logs_of_roles
-from pipelines.model.estimation.judgeable import Facts, JudgeableConfig, cannot_judge
+from pipelines.estimation.judgements import Facts, JudgeableConfig, cannot_judge
 from pipelines.model.rows.friction_terms import with_terms_told_apart
 from pipelines.model.rows.prepare import prepare
 from pipelines.model.rows.repeated import facts, nominal_estimate

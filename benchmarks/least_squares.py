@@ -39,9 +39,7 @@ import numpy as np
 
 from pipelines.dynamics.body import RigidBody
 from pipelines.dynamics.rrr import ACTING, RRR
-from pipelines.fit.equations import Block
-from pipelines.fit.least_squares import fit, solve
-from pipelines.fit.statistics import triangulate
+from pipelines.estimation.least_squares import Block, fit, solve, triangulate
 from pipelines.io.robot_files import load_robot
 
 _FIGAROH_UP_TO = 100_000  # beyond, its matrices do not fit beside the others'

@@ -27,10 +27,10 @@ import numpy as np
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import Look, diagnose_prepared
 from pipelines.diagnosis.trained import Standing, train
+from pipelines.estimation.estimate import Recipe
 from pipelines.import_log import STAGE, Settings
 from pipelines.io.files import open_log
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.prepare import Logs, Prepared, prepare
 from pipelines.stage import Request, run_stage

@@ -17,8 +17,8 @@ import numpy as np
 from scipy.signal import butter, filtfilt
 
 from pipelines.estimate_bps import Settings, compute
+from pipelines.estimation.result import Result
 from pipelines.io.files import open_log
-from pipelines.model.estimation.result import Result
 from pipelines.stage import Inputs
 
 _CUTOFF_HZ = 10.0

@@ -27,9 +27,9 @@ from bench.motions import Reference
 from bench.plant import record
 from pipelines.dynamics.arm import Arm
 from pipelines.estimation.motion import Reconstruction, reconstruct
+from pipelines.estimation.result import torques
 from pipelines.friction.in_folder import fitted_in_folder
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.estimation.outcome import torques
 from pipelines.writing.control_cases import tip_std
 from pipelines.writing.task import writing_task
 from pipelines.writing.validation import torque_validation

@@ -19,7 +19,7 @@ from typing import Any
 
 from pipelines.dynamics.parameter_names import named_in, quantity_of
 from pipelines.errors import InputRejected, NothingMatched, UsageError
-from pipelines.fit.differences import limit_of, standardised
+from pipelines.estimation.bootstrap import limit_of, standardised
 from pipelines.io.option import option
 from pipelines.io.results import read_any_result
 from pipelines.report.compared_results import (

@@ -14,12 +14,30 @@ from pathlib import Path
 from pipelines.dynamics.arm import Arm, ArmTorque
 from pipelines.dynamics.parameter import Uncertainty
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
+from pipelines.estimation.balance import power_balance
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
+from pipelines.estimation.comparison import averaged, compare, residuals
+from pipelines.estimation.consistency import consistency
+from pipelines.estimation.estimate import (
+    Fitted,
+    Judged,
+    Recipe,
+    fit_logs,
+    judge,
+    refuse_strange,
+    refuse_unfit,
+    with_cutoff,
+)
+from pipelines.estimation.identifiability import hard_to_see, not_separated
+from pipelines.estimation.judgements import REMEDY, negative_viscous
 from pipelines.estimation.mean_period import doubts
-from pipelines.estimation.motion import Reconstructed, for_equations, reconstruct
+from pipelines.estimation.motion import Motions, Reconstructed, for_equations, reconstruct
+from pipelines.estimation.nominal import columns_in_words, fitted_arm, nominal_columns
 from pipelines.estimation.observers import Reconstruction
-from pipelines.fit.identifiability import hard_to_see, not_separated
+from pipelines.estimation.rests import without_stiction
+from pipelines.estimation.result import Result, course, parameters, validity
+from pipelines.estimation.result import torques as torque_parts
 from pipelines.io.files import write_log
 from pipelines.io.log import ExperimentLog, derive, digest_of, recording
 from pipelines.io.model_file import (
@@ -32,28 +50,6 @@ from pipelines.io.model_file import (
 from pipelines.io.option import option
 from pipelines.io.results import encode
 from pipelines.io.schema import joint_unit
-from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
-from pipelines.model.estimation.balance import power_balance
-from pipelines.model.estimation.checks import consistency
-from pipelines.model.estimation.compare import compare
-from pipelines.model.estimation.floor import averaged, residuals
-from pipelines.model.estimation.logs import (
-    Fitted,
-    Judged,
-    Motions,
-    Recipe,
-    fit_logs,
-    judge,
-    with_cutoff,
-)
-from pipelines.model.estimation.negative_viscous import negative_viscous
-from pipelines.model.estimation.nominal import fitted_arm, nominal_columns
-from pipelines.model.estimation.outcome import Direction, course, parameters, validity
-from pipelines.model.estimation.outcome import torques as torque_parts
-from pipelines.model.estimation.rests import without_stiction
-from pipelines.model.estimation.result import Result
-from pipelines.model.estimation.words import columns_in_words
-from pipelines.model.excited import REMEDY
 from pipelines.model.plausibility import mismatches
 from pipelines.quality.checks import Subject, accepted
 from pipelines.report.bps_report import bps_report
@@ -221,7 +217,7 @@ def _result(fitted: Fitted, judged: Judged, motions: Motions, arm: Arm, settings
         friction_of="" if fitted.recipe.known is None else "fit-friction" if settings.model is None else Path(settings.model).name,
         physically_consistent=None if checked is None else checked.consistent, consistency=checked, balance=power_balance(found),
         unresolved=found.unresolved.told(columns_in_words(names)),
-        hard_to_see=tuple(Direction(d.singular_value, d.weights) for d in hard_to_see(found.solution, names)),
+        hard_to_see=hard_to_see(found.solution, names),
         not_separated=not_separated(found.solution, found.std, names),
         comparison=(), convergence_samples=growth.samples, convergence=growth.beta, convergence_std=growth.std,
         courses=tuple(course(log, motion, parts, fitted.cutoff_hz) for log, motion, parts in torques[:_COURSES]),

@@ -29,14 +29,13 @@ from pipelines.effects import find_effect
 from pipelines.effects.base import Effect
 from pipelines.errors import NothingMatched, UsageError
 from pipelines.estimation.checks.gates import examined, logs_of_roles
-from pipelines.estimation.motion import Reconstructed
+from pipelines.estimation.estimate import refuse_strange, refuse_unfit
+from pipelines.estimation.motion import Motions, Reconstructed
+from pipelines.estimation.result import torques, validity
 from pipelines.io.files import write_log
 from pipelines.io.log import ExperimentLog, derive, digest_of, recording
 from pipelines.io.model_file import Source, read_model, write_model
 from pipelines.io.option import option
-from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
-from pipelines.model.estimation.logs import Motions
-from pipelines.model.estimation.outcome import torques, validity
 from pipelines.model.rows.families import Wanted, place_of
 from pipelines.model.rows.friction_terms import with_terms_told_apart
 from pipelines.model.rows.prepare import BLOCKS, prepare

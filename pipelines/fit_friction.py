@@ -20,8 +20,11 @@ from pipelines.dynamics.body import Array
 from pipelines.dynamics.parameter import Origin, Parameter
 from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import Check, NothingMatched, UsageError, did_you_mean
+from pipelines.estimation.estimate import Recipe
 from pipelines.estimation.motion import reconstruct
+from pipelines.estimation.nominal import fitted_arm
 from pipelines.estimation.observers import Reconstruction
+from pipelines.estimation.result import validity
 from pipelines.friction.config import FolderConfig
 from pipelines.friction.findings import findings_of, misfits
 from pipelines.friction.joint import (
@@ -41,9 +44,6 @@ from pipelines.io.log import ExperimentLog, derive, digest_of, recording
 from pipelines.io.model_file import ModelFile, Source, read_model, write_model
 from pipelines.io.option import option
 from pipelines.io.results import encode
-from pipelines.model.estimation.logs import Recipe
-from pipelines.model.estimation.nominal import fitted_arm
-from pipelines.model.estimation.outcome import validity
 from pipelines.quality.checks import Subject, accepted
 from pipelines.report.friction_report import friction_report
 from pipelines.report.report import Report

@@ -196,7 +196,7 @@ def _periods(subject: Subject, opened: Opened) -> list[Check]:
     # observers, for the few logs that have periods
     from pipelines.estimation.mean_period import doubts, mean_period
     from pipelines.estimation.motion import Reconstruction, reconstruct
-    from pipelines.model.estimation.conditioning import cutoff_at, wanted_cutoff
+    from pipelines.estimation.regression import cutoff_at, wanted_cutoff
 
     found = reconstruct(log, Reconstruction(), subject.good)
     rate = 1.0 / log.sample_time

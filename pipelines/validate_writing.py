@@ -21,6 +21,7 @@ from pipelines.dynamics.arm import Arm, ArmTorque
 from pipelines.dynamics.body import Motion
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
 from pipelines.estimation.motion import Reconstructed, Reconstruction, reconstruct
+from pipelines.estimation.result import torques
 from pipelines.friction.in_folder import fitted_in_folder
 from pipelines.importers.recipe import Recipe
 from pipelines.importers.units import controller_table, write_controller_table
@@ -31,7 +32,6 @@ from pipelines.io.option import option
 from pipelines.io.robot import RobotDescription
 from pipelines.io.robot_files import load_robot, robot_at_hand, robot_sources
 from pipelines.io.sandbox import read_small_text
-from pipelines.model.estimation.outcome import torques
 from pipelines.quality.checks import Subject, accepted
 from pipelines.report.report import Report
 from pipelines.report.writing_report import writing_report

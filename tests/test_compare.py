@@ -14,7 +14,7 @@ from scipy import stats
 
 from pipelines import compare
 from pipelines.errors import InputRejected, RrridError, UsageError
-from pipelines.fit.differences import limit_of, standardised
+from pipelines.estimation.bootstrap import limit_of, standardised
 from pipelines.io.output import hash_file
 from pipelines.report.comparison_report import Comparison
 from pipelines.stage import Outcome, Request, run_stage

@@ -16,7 +16,6 @@ LAYERS = {
     "pipelines.io": 1,
     "pipelines.quality": 2,
     "pipelines.importers": 3,
-    "pipelines.fit": 4,
     "pipelines.dynamics": 5,
     "pipelines.effects": 6,
     "pipelines.dynamics.arm": 6.5, "pipelines.dynamics.draw": 6.6, "pipelines.dynamics.named_cause": 6.6, "pipelines.dynamics.parameter_names": 6.5,
@@ -25,8 +24,8 @@ LAYERS = {
     "pipelines.model": 7,
     "pipelines.model.rows": 8,
     "pipelines.friction": 8.5, "pipelines.frequency": 8.5, "pipelines.writing": 9, "pipelines.excitation": 10,
-    "pipelines.estimation.motion_result": 8, "pipelines.estimation.checks": 9,
-    "pipelines.model.estimation.result": 10, "pipelines.diagnosis": 11,
+    "pipelines.estimation.checks": 9,
+    "pipelines.estimation.result": 10, "pipelines.diagnosis": 11,
     "pipelines.report": 12,
     "pipelines.export": 12.5,
     "pipelines.stage": 13,
@@ -128,7 +127,7 @@ def test_the_rule_can_be_broken() -> None:
     """Each kind of breach is seen: upwards, sideways between stages, between effects, out of the bench."""
     for module, imported in (("pipelines.io.files", "pipelines.dynamics.body"), ("pipelines.convert", "pipelines.inspect"),
                              ("pipelines.effects.friction", "pipelines.effects.drives"),
-                             ("pipelines.fit", "pipelines.estimation.motion"), ("bench.plant", "pipelines.dynamics.arm"),
+                             ("pipelines.dynamics.arm", "pipelines.estimation.motion"), ("bench.plant", "pipelines.dynamics.arm"),
                              ("bench.faults.load", "bench.faults.drive"),
                              ("pipelines.run", "bench"),
                              ("pipelines.report.render", "pipelines.stage")):
@@ -171,7 +170,7 @@ def test_the_bench_works_without_the_model() -> None:
     """With everything of ours but log/ and errors out of reach, it still records a log of a sick machine."""
     code = """
 import sys
-for name in ("model", "dynamics", "simulation", "fit", "estimation", "report", "stage"):
+for name in ("model", "dynamics", "simulation", "estimation", "report", "stage"):
     sys.modules[f"pipelines.{name}"] = None
 from bench.draw import draw_machine
 from bench.experiments import excitation

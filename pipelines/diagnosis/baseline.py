@@ -17,8 +17,8 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset
 from pipelines.diagnosis.prior import Prior
 from pipelines.diagnosis.screening import Screened, best_of, screen
-from pipelines.fit.bootstrap import chi2_bound, upper_point
-from pipelines.fit.joint_table import Array, Arrow, Structure, Table
+from pipelines.estimation.bootstrap import chi2_bound, upper_point
+from pipelines.estimation.joint_table import Array, Arrow, Structure, Table
 
 __all__ = ["Baseline", "Parts", "Sums", "baseline"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipelines.model.estimation.logs import Recipe
+from pipelines.estimation.estimate import Recipe
 
 __all__ = ["DiagnosisConfig"]
 

@@ -18,9 +18,9 @@ import numpy.typing as npt
 
 from pipelines.dynamics.arm import Arm
 from pipelines.errors import InputRejected
-from pipelines.fit.joint_table import Array, Indices, Table, by_joint, in_rows
+from pipelines.estimation.joint_table import Array, Indices, Table, by_joint, in_rows
+from pipelines.estimation.regression import Columns
 from pipelines.io.log import ExperimentLog
-from pipelines.model.estimation.regression import Columns
 from pipelines.model.rows.data import Data, Kept, Whitening
 from pipelines.model.rows.exact import Exact, further_slopes, nominal_slopes
 from pipelines.model.rows.nominal import fit_columns, fit_nominal, rows_of

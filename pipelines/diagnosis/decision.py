@@ -19,10 +19,9 @@ from pipelines.diagnosis.selection import Cause, Round, Selection
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.unnamed import in_words
 from pipelines.dynamics.arm import Arm
-from pipelines.fit.bootstrap import chi2_bound
-from pipelines.fit.joint_table import Array, in_rows
-from pipelines.model.estimation.judgeable import cannot_judge
-from pipelines.model.estimation.negative_viscous import negative_viscous
+from pipelines.estimation.bootstrap import chi2_bound
+from pipelines.estimation.joint_table import Array, in_rows
+from pipelines.estimation.judgements import cannot_judge, negative_viscous
 from pipelines.model.rows.prepare import Prepared
 from pipelines.model.rows.repeated import Repeated, facts, nominal_estimate
 

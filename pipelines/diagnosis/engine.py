@@ -21,8 +21,8 @@ from pipelines.diagnosis.state import State
 from pipelines.diagnosis.trained import covariance
 from pipelines.diagnosis.variance import settle
 from pipelines.dynamics.arm import Acting
-from pipelines.fit.bootstrap import wald
-from pipelines.fit.joint_table import Array, Table, in_rows
+from pipelines.estimation.bootstrap import wald
+from pipelines.estimation.joint_table import Array, Table, in_rows
 from pipelines.io.log import ExperimentLog
 from pipelines.model.rows.exact import difference
 from pipelines.model.rows.prepare import Logs, Prepared, prepare

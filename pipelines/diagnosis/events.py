@@ -15,8 +15,8 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Rows
 from pipelines.dynamics.arm import Arm
 from pipelines.effects.base import Effect, Event
-from pipelines.fit.bootstrap import chi2_bound, upper_point
-from pipelines.fit.joint_table import Array, Indices, by_joint
+from pipelines.estimation.bootstrap import chi2_bound, upper_point
+from pipelines.estimation.joint_table import Array, Indices, by_joint
 
 __all__ = ["DIRECTIONS", "Window", "push_of", "windows_of"]
 

@@ -25,10 +25,10 @@ from pipelines.diagnosis.standing import standing_of
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.trained import covariance, train
 from pipelines.dynamics.arm import Acting
+from pipelines.estimation.nominal import plain_number
 from pipelines.model.rows.families import Wanted, usable
 from pipelines.model.rows.fit import worse_log
 from pipelines.model.rows.prepare import Prepared
-from pipelines.model.words import plain_number
 
 __all__ = ["extend"]
 

@@ -30,7 +30,7 @@ from pipelines.diagnosis.selection import Round, laws_of
 from pipelines.diagnosis.state import Fit, State
 from pipelines.diagnosis.trained import Standing, Trained, parameters, told
 from pipelines.dynamics.arm import Acting
-from pipelines.fit.joint_table import Array
+from pipelines.estimation.joint_table import Array
 from pipelines.model.rows.exact import Named
 from pipelines.model.rows.fit import Refined, TorqueGain, torque_gain_of
 from pipelines.model.rows.prepare import Prepared

@@ -35,7 +35,7 @@ from pipelines.diagnosis.state import State
 from pipelines.diagnosis.unnamed import Key
 from pipelines.effects import all_effects
 from pipelines.effects.base import Effect, FrictionLaw, Quantity
-from pipelines.fit.joint_table import Array
+from pipelines.estimation.joint_table import Array
 from pipelines.friction.laws import LADDER
 
 __all__ = ["Limits", "limits_of", "without_limit"]

@@ -30,7 +30,7 @@ from pipelines.diagnosis.unnamed import FORM
 from pipelines.diagnosis.variance import Components, components
 from pipelines.effects import find_effect
 from pipelines.effects.base import FrictionLaw
-from pipelines.fit.joint_table import Array, Arrow, Indices, Structure, Table
+from pipelines.estimation.joint_table import Array, Arrow, Indices, Structure, Table
 
 __all__ = ["RIDGE", "Belief", "Prior", "of_any_size", "prior_of", "rubs"]
 

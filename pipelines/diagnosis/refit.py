@@ -25,8 +25,8 @@ from pipelines.diagnosis.state import State
 from pipelines.diagnosis.unnamed import FORM, Key
 from pipelines.dynamics.config import ORDERS
 from pipelines.effects.base import Effect, FrictionLaw
-from pipelines.fit.bootstrap import chi2_bound
-from pipelines.fit.joint_table import Array, Arrow, Indices, Table, by_joint, gains, in_rows
+from pipelines.estimation.bootstrap import chi2_bound
+from pipelines.estimation.joint_table import Array, Arrow, Indices, Table, by_joint, gains, in_rows
 from pipelines.model.rows.data import END
 from pipelines.model.rows.exact import Exact, Named
 

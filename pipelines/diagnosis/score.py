@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.fit.joint_table import Array, Arrow, Indices, Table
+from pipelines.estimation.joint_table import Array, Arrow, Indices, Table
 
 __all__ = ["Blocks", "confidence_set", "log_scores", "probabilities"]
 

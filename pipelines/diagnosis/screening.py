@@ -15,7 +15,7 @@ import numpy as np
 
 from pipelines.diagnosis.candidates import Group
 from pipelines.diagnosis.unnamed import Key
-from pipelines.fit.joint_table import Array, Arrow
+from pipelines.estimation.joint_table import Array, Arrow
 
 __all__ = ["Screened", "best_of", "price", "screen"]
 

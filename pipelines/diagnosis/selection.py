@@ -23,7 +23,7 @@ from pipelines.diagnosis.unnamed import Key, in_words
 from pipelines.dynamics.arm import Acting
 from pipelines.effects.base import Effect
 from pipelines.effects.friction import Coulomb
-from pipelines.fit.joint_table import Array
+from pipelines.estimation.joint_table import Array
 from pipelines.model.rows.exact import Exact, Named
 from pipelines.model.rows.families import first_samples
 

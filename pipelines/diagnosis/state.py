@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from pipelines.diagnosis.prior import Belief
-from pipelines.fit.joint_table import Array, Arrow, Indices, Table
+from pipelines.estimation.joint_table import Array, Arrow, Indices, Table
 from pipelines.model.rows.exact import Exact
 
 __all__ = ["Fit", "State"]

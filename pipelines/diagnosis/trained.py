@@ -29,7 +29,7 @@ from pipelines.diagnosis.score import confidence_set, log_scores
 from pipelines.diagnosis.state import State
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Motion
-from pipelines.fit.joint_table import Array, Arrow, Table
+from pipelines.estimation.joint_table import Array, Arrow, Table
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.exact import Exact, Named, Which, slopes_of
 from pipelines.model.rows.fit import Refined, acting, with_uncertainty

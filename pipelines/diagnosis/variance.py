@@ -22,7 +22,7 @@ from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.events import windows_of
 from pipelines.diagnosis.screening import Screened, best_of, screen
 from pipelines.dynamics.arm import Arm
-from pipelines.fit.joint_table import Array, Arrow, Indices, Structure, Table
+from pipelines.estimation.joint_table import Array, Arrow, Indices, Structure, Table
 
 __all__ = ["Components", "components", "settle"]
 

@@ -7,20 +7,35 @@ moments of mass:
     p1  = ∫₂ (X² - y²) + a2² m3                   p12 = ∫₂ (X² + y²) + a2² m3 + p13
 
 so that each of the following is a sum of positive moments, or a Schwarz inequality between them.
-All are necessary, not sufficient: `pipelines.fit.consistency` asks for bodies that have all
+All are necessary, not sufficient: `pipelines.estimation.consistency` asks for bodies that have all
 parameters at once.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from pipelines.fit.consistency import Inequality
 from pipelines.io.log import Array
 
-__all__ = ["rrr_inequalities"]
+__all__ = ["Inequality", "rrr_inequalities"]
 
 _P1, _P5, _P6, _P12, _P13 = 0, 4, 5, 11, 12  # numerics: places in p
+
+
+@dataclass(frozen=True)
+class Inequality:
+    """A quantity that physics demands to be positive, with its uncertainty."""
+
+    name: str  # "p13 - p5 = 2 ∫ y² dm > 0"
+    value: float
+    std: float
+
+    @property
+    def satisfied(self) -> bool:
+        """Return whether it holds within three deviations; where those are unknown, as it is."""
+        return self.value > -(3.0 * self.std if np.isfinite(self.std) else 0.0)
 
 
 def rrr_inequalities(p: Array, covariance: Array) -> tuple[Inequality, ...]:

@@ -12,12 +12,12 @@ from pipelines.estimation.grids import Measured, lay_on, measured
 from pipelines.estimation.mean_period import NoiseFloor, mean_period
 from pipelines.estimation.motion import Reconstructed
 from pipelines.estimation.observers import Reconstruction, encoder_resolution, tuned_observers
+from pipelines.estimation.regression import cutoff_at, wanted_cutoff
 from pipelines.estimation.state_estimation import Observer
 from pipelines.estimation.tuning import innovations, paper_rule, smoother_bandwidth, whiteness
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.results import NOT_STORED
 from pipelines.io.schema import joint_unit
-from pipelines.model.estimation.conditioning import cutoff_at, wanted_cutoff
 
 _CONFIG = ResultConfig()
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.fit.bounded import least_squares
+from pipelines.estimation.bounded import least_squares
 from pipelines.frequency.config import HeldConfig
 from pipelines.frequency.spectra import Array, Complex, FrequencyResponse, Responses, closed_loop
 

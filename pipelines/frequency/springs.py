@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.fit.bounded import Minimum, least_squares
+from pipelines.estimation.bounded import Minimum, least_squares
 from pipelines.frequency.config import ModesConfig, SpringsConfig
 from pipelines.frequency.modes import Pair
 from pipelines.frequency.spectra import Array

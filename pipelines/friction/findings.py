@@ -14,13 +14,13 @@ import numpy as np
 
 from pipelines.dynamics.arm import Arm
 from pipelines.errors import Check, RrridError
+from pipelines.estimation.nominal import plain_number
 from pipelines.friction.config import FindingsConfig
 from pipelines.friction.fit import Number
 from pipelines.friction.joint import JointFit
 from pipelines.friction.laws import gravity_acts
 from pipelines.friction.result import JointResult
 from pipelines.io.log import ExperimentLog
-from pipelines.model.words import plain_number
 
 __all__ = ["drift_in_words", "findings_of", "misfits"]
 

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.dynamics.body import Array, Motion
-from pipelines.fit.varpro import Separable, SeparableFit, fit_separable, scan, search
+from pipelines.estimation.varpro import Separable, SeparableFit, fit_separable, scan, search
 from pipelines.friction.config import FitConfig
 from pipelines.friction.laws import Law, OneJoint, law_named
 from pipelines.friction.weak_form import Stretch, Windows

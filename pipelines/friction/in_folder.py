@@ -14,22 +14,15 @@ from collections.abc import Iterable, Sequence
 
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.parameter import Parameter
-from pipelines.estimation.motion import Reconstruction, reconstruct
+from pipelines.estimation.comparison import averaged
+from pipelines.estimation.estimate import Fitted, Recipe, fit_logs, motions_of, with_cutoff
+from pipelines.estimation.motion import Motions, Reconstruction, reconstruct
+from pipelines.estimation.nominal import fitted_arm, nominal_columns
 from pipelines.friction.config import FolderConfig
 from pipelines.friction.joint import JointLogs, fit_joint, friction_of
 from pipelines.friction.laws import law_named
 from pipelines.friction.several import fit_several
 from pipelines.io.log import ExperimentLog
-from pipelines.model.estimation.floor import averaged
-from pipelines.model.estimation.logs import (
-    Fitted,
-    Motions,
-    Recipe,
-    fit_logs,
-    motions_of,
-    with_cutoff,
-)
-from pipelines.model.estimation.nominal import fitted_arm, nominal_columns
 
 __all__ = ["fitted_in_folder"]
 

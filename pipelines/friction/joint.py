@@ -19,7 +19,7 @@ from pipelines.dynamics.body import Array, Motion
 from pipelines.effects import find_effect
 from pipelines.errors import InputRejected
 from pipelines.estimation.motion import Reconstructed, encoder_resolution
-from pipelines.fit.varpro import with_block_covariance
+from pipelines.estimation.varpro import with_block_covariance
 from pipelines.friction.breakaway import Event, break_away, held_at_least
 from pipelines.friction.config import JointConfig, SlidingConfig
 from pipelines.friction.ekf import filtered

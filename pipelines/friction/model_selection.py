@@ -19,11 +19,11 @@ import numpy as np
 
 from pipelines.dynamics.body import Array
 from pipelines.effects import find_effect
-from pipelines.fit.varpro import held_out, linear_part
+from pipelines.estimation.nominal import plain_number
+from pipelines.estimation.varpro import held_out, linear_part
 from pipelines.friction.config import LadderConfig
 from pipelines.friction.fit import Equations, LawFit, fit_law, takes_power
 from pipelines.friction.laws import LADDER, Law, with_further
-from pipelines.model.words import plain_number
 
 __all__ = ["CandidateFit", "Ladder", "Missing", "climb", "no_worse", "undecided"]
 

@@ -22,7 +22,7 @@ from pipelines.errors import InputRejected
 from pipelines.estimation.smoother import smooth
 from pipelines.estimation.state_estimation import design
 from pipelines.estimation.tuning import tune_smoother
-from pipelines.fit.varpro import SeparableFit, search
+from pipelines.estimation.varpro import SeparableFit, search
 from pipelines.friction.config import RefineConfig
 from pipelines.friction.fit import LawEquations, LawFit, fit_law, ranked
 from pipelines.friction.laws import Law, OneJoint, gravity_columns

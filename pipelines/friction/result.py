@@ -8,6 +8,8 @@ import numpy as np
 
 from pipelines.dynamics.arm import Arm
 from pipelines.errors import Check
+from pipelines.estimation.estimate import Fitted
+from pipelines.estimation.motion import Motions
 from pipelines.friction.breakaway import Event
 from pipelines.friction.config import DriftConfig
 from pipelines.friction.fit import LawFit, Value
@@ -19,7 +21,6 @@ from pipelines.friction.weak_form import moved
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.model_file import ModelFile
 from pipelines.io.results import NOT_STORED
-from pipelines.model.estimation.logs import Fitted, Motions
 
 __all__ = ["CandidateLaw", "Drift", "JointResult", "Posture", "Result", "Series",
            "Sticking", "Validation", "joint_result", "several_results"]

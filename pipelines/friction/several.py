@@ -16,21 +16,15 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.dynamics.body import Array, Motion
+from pipelines.estimation.estimate import Fitted, Recipe, equations_of, fit_logs, with_cutoff
 from pipelines.estimation.filters import LowPass, centre_samples, zero_phase
+from pipelines.estimation.motion import Motions
+from pipelines.estimation.nominal import nominal_columns
+from pipelines.estimation.regression import Columns as RigidColumns
+from pipelines.estimation.regression import LogEquations
 from pipelines.friction.fit import Columns, Equations
 from pipelines.friction.laws import LADDER, Law, OneJoint
 from pipelines.friction.model_selection import Ladder, climb
-from pipelines.model.estimation.logs import (
-    Fitted,
-    Motions,
-    Recipe,
-    equations_of,
-    fit_logs,
-    with_cutoff,
-)
-from pipelines.model.estimation.nominal import nominal_columns
-from pipelines.model.estimation.regression import Columns as RigidColumns
-from pipelines.model.estimation.regression import LogEquations
 
 __all__ = ["RowEquations", "SeveralFit", "fit_several"]
 

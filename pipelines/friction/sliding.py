@@ -30,9 +30,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.dynamics.body import Array
-from pipelines.fit.bounded import least_between
-from pipelines.fit.flips import by_flips
-from pipelines.fit.varpro import held_out
+from pipelines.estimation.bootstrap import by_flips
+from pipelines.estimation.bounded import least_between
+from pipelines.estimation.varpro import held_out
 from pipelines.friction.config import DriftConfig, SlidingConfig
 from pipelines.friction.fit import LawEquations
 from pipelines.friction.laws import OneJoint

@@ -19,9 +19,9 @@ import numpy as np
 from pipelines.dynamics.body import Array
 from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import Check
+from pipelines.estimation.judgements import excited
 from pipelines.model.clock_offset import away_from_reversals, clock_offset
 from pipelines.model.evidence import Evidence
-from pipelines.model.excited import excited
 from pipelines.model.mix_ups import (
     ANGLE_UNITS,
     UNIT_REMEDY,

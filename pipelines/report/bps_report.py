@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.model.estimation.balance import ALONE, CLOSED, TOGETHER, Balance
-from pipelines.model.estimation.compare import Compared
-from pipelines.model.estimation.outcome import Estimated
-from pipelines.model.estimation.result import Result
-from pipelines.model.estimation.words import column_in_words
+from pipelines.estimation.balance import Balance
+from pipelines.estimation.comparison import Compared
+from pipelines.estimation.config import BalanceConfig
+from pipelines.estimation.nominal import column_in_words
+from pipelines.estimation.result import Estimated, Result
 from pipelines.report import style
 from pipelines.report.figures import Array, compared_figure, legend_above, one_figure
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone, columns_table
@@ -90,7 +90,7 @@ def _verdict(result: Result) -> str:
 
 def _contradictions(result: Result) -> tuple[str, ...]:
     """What the estimate's own checks say against its parameters or their standard deviations."""
-    return _paragraphs("contradictions", result.balance, *_settling(result), ALONE)
+    return _paragraphs("contradictions", result.balance, *_settling(result), BalanceConfig.alone)
 
 
 def _worst_joints(result: Result) -> tuple[tuple[str, float], ...]:
@@ -190,10 +190,18 @@ def _parameter_section(result: Result) -> Section:
         for p in parameters
         if p.value is not None and p.known is not None and p.std
     }
-    far = sorted((name for name in apart if apart[name] > ALONE), key=lambda name: -apart[name])
+    far = sorted(
+        (name for name in apart if apart[name] > BalanceConfig.alone), key=lambda name: -apart[name]
+    )
     farthest = [_within(name) for name in far[:_FAR]]
     text = _paragraphs(
-        "parameters", _SURE, len(apart), len(far), farthest, ALONE, _rotors_within_links(result)
+        "parameters",
+        _SURE,
+        len(apart),
+        len(far),
+        farthest,
+        BalanceConfig.alone,
+        _rotors_within_links(result),
     )
     return Section("Parameters", text, (columns_table(columns, caption, tones),))
 
@@ -296,7 +304,7 @@ def _trust_section(result: Result) -> Section:
     text = (
         _say("friction", result),
         *_balance_words(result.balance),
-        *_paragraphs("settling", *_settling(result), ALONE),
+        *_paragraphs("settling", *_settling(result), BalanceConfig.alone),
     )
     title = "What the estimate rests on"
     return Section(title, text, tuple(tables), (_convergence_figure(result),))
@@ -306,12 +314,12 @@ def _balance_words(balance: Balance | None) -> tuple[str, ...]:
     """What the balance of power says, and what a difference would mean."""
     if balance is None:
         return ()
-    closed = balance.closure > CLOSED
-    late = abs(balance.delay) > ALONE * balance.delay_std
-    in_time = abs(balance.delay) < ALONE * balance.delay_std
+    closed = balance.closure > BalanceConfig.closed
+    late = abs(balance.delay) > BalanceConfig.alone * balance.delay_std
+    in_time = abs(balance.delay) < BalanceConfig.alone * balance.delay_std
     pairs = zip(balance.names, balance.apart, strict=True)
-    differing = [_within(name) for name, apart in pairs if apart > ALONE]
-    alike = max(balance.apart) < ALONE and balance.deviate < TOGETHER
+    differing = [_within(name) for name, apart in pairs if apart > BalanceConfig.alone]
+    alike = max(balance.apart) < BalanceConfig.alone and balance.deviate < BalanceConfig.together
     return _paragraphs("balance", balance, closed and alike and in_time, closed, late, differing)
 
 
@@ -327,8 +335,10 @@ def _balance_table(result: Result, balance: Balance) -> Table:
         "unit": [*(format_unit(fitted[name].unit) for name in balance.names), "ms"],
         "apart [std]": [round(x, 1) for x in apart],
     }
-    tones: tuple[Tone, ...] = tuple("attention" if round(x, 1) > ALONE else "good" for x in apart)
-    chance = f"Above {ALONE:g} standard deviations a difference is not chance."
+    tones: tuple[Tone, ...] = tuple(
+        "attention" if round(x, 1) > BalanceConfig.alone else "good" for x in apart
+    )
+    chance = f"Above {BalanceConfig.alone:g} standard deviations a difference is not chance."
     return columns_table(columns, f"{balance.windows} balances of work and energy. {chance}", tones)
 
 

@@ -21,8 +21,8 @@ from pipelines.diagnosis.result import (
     Value,
 )
 from pipelines.effects import find_effect
+from pipelines.estimation.nominal import within
 from pipelines.io.log import Array
-from pipelines.model.words import within
 from pipelines.report.diagnosis_finding import (
     all_together,
     finding_section,

@@ -16,8 +16,8 @@ import numpy as np
 
 from pipelines.diagnosis.result import Alternative, Diagnosis, Finding, Value
 from pipelines.effects import find_effect
+from pipelines.estimation.nominal import plain_number, within
 from pipelines.io.log import Array
-from pipelines.model.words import plain_number, within
 from pipelines.report.config import REPORT
 
 __all__ = ["how_much", "of_any_size", "other_joint", "summary_of", "taken_in", "where"]

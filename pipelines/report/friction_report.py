@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipelines.effects import find_effect
+from pipelines.estimation.nominal import plain_number
 from pipelines.friction.config import BreakAwayConfig, FindingsConfig
 from pipelines.friction.findings import drift_in_words
 from pipelines.friction.fit import Value
 from pipelines.friction.laws import law_named
 from pipelines.friction.result import JointResult, Result, Series
-from pipelines.model.words import plain_number
 from pipelines.report import style
 from pipelines.report.figures import (
     Look,

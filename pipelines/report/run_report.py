@@ -15,9 +15,9 @@ from pipelines.diagnosis.result import Diagnosis, Extension, Finding, Gain
 from pipelines.diagnosis.result import Result as Diagnosed
 from pipelines.errors import Check, NothingMatched
 from pipelines.estimation.checks.boundary import Boundary
+from pipelines.estimation.result import Result as Estimate
 from pipelines.io.output import slug
 from pipelines.io.results import FLAT, NOT_STORED
-from pipelines.model.estimation.result import Result as Estimate
 from pipelines.report import style
 from pipelines.report.diagnosis_finding import span_words
 from pipelines.report.figures import Look, one_figure

@@ -17,8 +17,8 @@ from pipelines.diagnosis.result import Diagnosis, Extension, Finding, Rejected, 
 from pipelines.diagnosis.result import Result as Diagnosed
 from pipelines.dynamics.parameter_names import Named, named_in, numbered, part_of
 from pipelines.effects import effect_names, find_effect
+from pipelines.estimation.nominal import within
 from pipelines.model.rows.prepare import FewerTerms
-from pipelines.model.words import within
 from pipelines.report.finding_words import other_joint
 from pipelines.report.sentences import capital, sentence
 from pipelines.report.style import (

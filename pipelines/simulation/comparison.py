@@ -18,9 +18,8 @@ import numpy.typing as npt
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.body import Motion
 from pipelines.errors import InputRejected
-from pipelines.estimation.motion import Reconstructed
+from pipelines.estimation.motion import Motions, Reconstructed
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.estimation.logs import Motions
 from pipelines.simulation.closed_loop import run_together
 from pipelines.simulation.config import SIMULATION
 from pipelines.simulation.experiment import Experiment

@@ -22,12 +22,12 @@ from pipelines.dynamics.kinematics import serial_chain, tip_position
 from pipelines.errors import Check, RrridError
 from pipelines.estimation.filters import zero_phase
 from pipelines.estimation.motion import Reconstructed
+from pipelines.estimation.regression import condition
 from pipelines.importers.units import ControllerTable
 from pipelines.io.log import Array, ExperimentLog, recording
 from pipelines.io.output import slug
 from pipelines.io.results import NOT_STORED
 from pipelines.io.schema import joint_unit
-from pipelines.model.estimation.conditioning import condition
 from pipelines.simulation.imitate import How, Imitation, imitate
 from pipelines.writing.config import CONFIG
 from pipelines.writing.control_cases import (

@@ -16,10 +16,10 @@ from bench.faults import fault_names, find_fault, make
 from bench.machine import Fault, Machine
 from bench.plant import peak_torque, record
 from pipelines.errors import InputRejected
+from pipelines.estimation.estimate import Recipe, fit_logs, judge, motions_of
+from pipelines.estimation.nominal import nominal_columns
 from pipelines.estimation.observers import Reconstruction
 from pipelines.io.log import ExperimentLog
-from pipelines.model.estimation.logs import Recipe, fit_logs, judge, motions_of
-from pipelines.model.estimation.nominal import nominal_columns
 
 DURATION = 10.0  # [s]
 CHANGE = 3.0  # times the healthy residual

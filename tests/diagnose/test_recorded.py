@@ -20,8 +20,8 @@ from benchmarks.recorded_diagnosis import (
     searched,
 )
 from pipelines.diagnosis.selection import Selection
+from pipelines.estimation.estimate import Recipe
 from pipelines.io.files import open_log
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnosis.asking import answered
 

@@ -15,7 +15,7 @@ from bench.draw import draw_machine
 from bench.plant import record
 from pipelines.diagnosis.findings import gain_of
 from pipelines.dynamics.body import Motion
-from pipelines.model.estimation.logs import Recipe
+from pipelines.estimation.estimate import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.fit import TorqueGain, no_better, worse_log
 from pipelines.model.rows.nominal import fit_nominal

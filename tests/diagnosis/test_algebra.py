@@ -10,7 +10,15 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.prior import Belief
 from pipelines.diagnosis.score import Blocks, confidence_set
 from pipelines.diagnosis.screening import screen
-from pipelines.fit.joint_table import Array, Arrow, Structure, Table, by_joint, gains, in_rows
+from pipelines.estimation.joint_table import (
+    Array,
+    Arrow,
+    Structure,
+    Table,
+    by_joint,
+    gains,
+    in_rows,
+)
 
 _ROWS, _JOINTS, _KNOWN, _MORE = 240, 3, 5, 2
 

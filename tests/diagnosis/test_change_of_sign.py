@@ -10,8 +10,8 @@ import pytest
 from pipelines.diagnosis.dataset import load
 from pipelines.dynamics.body import Motion
 from pipelines.effects.friction import Coulomb
+from pipelines.estimation.estimate import Recipe
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnose.sessions import but
 from tests.diagnosis.arms import hidden

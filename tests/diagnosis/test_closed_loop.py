@@ -16,12 +16,12 @@ from benchmarks.hidden_effects.cases import campaign
 from benchmarks.hidden_effects.make import make_cases
 from benchmarks.other_plants.drawn import drawn, pairs
 from pipelines import diagnose
+from pipelines.estimation.estimate import Recipe, motions_of, with_cutoff
 from pipelines.estimation.motion import Reconstruction
+from pipelines.estimation.regression import wanted_cutoff
 from pipelines.io.files import open_log, write_log
 from pipelines.io.log import ExperimentLog
 from pipelines.io.results import encode
-from pipelines.model.estimation.conditioning import wanted_cutoff
-from pipelines.model.estimation.logs import Recipe, motions_of, with_cutoff
 from pipelines.stage import Request
 from tests.diagnosis.arms import hidden
 from tests.diagnosis.asking import causes, diagnosed, effects

@@ -14,8 +14,8 @@ from pipelines.effects.angle import Cogging
 from pipelines.effects.base import Effect
 from pipelines.effects.bodies import GravityTilt, Payload, TransmissionCoupling
 from pipelines.effects.friction import TorqueOffset
+from pipelines.estimation.estimate import Recipe
 from pipelines.io.log import Array
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact, Named
 from pipelines.model.rows.fit import Refined, _by_slopes, acting, refine
 from pipelines.model.rows.nominal import fit_nominal

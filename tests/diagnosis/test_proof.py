@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pipelines.effects.angle import Cogging
-from pipelines.model.estimation.logs import Recipe
+from pipelines.estimation.estimate import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.fit import refine
 from pipelines.model.rows.nominal import fit_nominal

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.estimation.estimate import Recipe
 from pipelines.io.log import Array
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.prepare import Logs, prepare
 from pipelines.model.rows.repeated import Repeated

@@ -10,7 +10,7 @@ import pytest
 from pipelines.dynamics.chain import standard_parameters
 from pipelines.dynamics.consistency import rrr_inequalities
 from pipelines.dynamics.rrr import RRR, combined
-from pipelines.fit.consistency import physical_consistency
+from pipelines.estimation.consistency import physical_consistency
 from pipelines.io.robot import LinkParameters
 from pipelines.io.robot_files import load_robot
 from tests.dynamics.serial_arms import physical_links

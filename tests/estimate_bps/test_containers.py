@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from pipelines import estimate_bps, reconstruct
+from pipelines.estimation.nominal import column_in_words
 from pipelines.io.files import open_log, write_log
 from pipelines.io.log import ExperimentLog
 from pipelines.io.model_file import read_model
-from pipelines.model.estimation.words import column_in_words
 from pipelines.stage import Request, run_stage
 from tests.estimate_bps.estimates import SYMMETRIC, contents, of_elbow, stage
 from tests.healthy import begun, with_signal

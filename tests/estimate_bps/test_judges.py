@@ -11,11 +11,11 @@ import pytest
 
 from pipelines import estimate_bps
 from pipelines.errors import InputRejected, UsageError
+from pipelines.estimation.comparison import Compared
 from pipelines.io.files import write_log
 from pipelines.io.log import ExperimentLog
 from pipelines.io.model_file import model_text
 from pipelines.io.robot import format_robot
-from pipelines.model.estimation.compare import Compared
 from pipelines.report.bps_report import bps_report
 from pipelines.stage import Request, run_stage
 from tests.cli.commands import rrrid

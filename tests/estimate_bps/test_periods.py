@@ -11,10 +11,10 @@ import pytest
 
 from pipelines import estimate_bps, reconstruct
 from pipelines.estimate_bps import Result, compute
+from pipelines.estimation.comparison import Beside
 from pipelines.io.files import Opened
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.results import decode, encode
-from pipelines.model.estimation.floor import Beside
 from pipelines.report.bps_report import bps_report
 from pipelines.stage import Inputs, Request, run_stage
 from sample_logs.make_closed_form import NOISE, torque_step

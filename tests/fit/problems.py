@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import signal
 
-from pipelines.fit.equations import Array, Block
+from pipelines.estimation.least_squares import Block
+from pipelines.io.log import Array
 
 RATE = 500.0
 CHANNELS, WIDTH = 3, 13

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.fit.bootstrap import apart, wald
-from pipelines.fit.equations import Array
+from pipelines.estimation.bootstrap import apart, wald
+from pipelines.io.log import Array
 
 
 def _blocks(rng: np.random.Generator, blocks: int, worse: float) -> tuple[Array, Array, Array]:

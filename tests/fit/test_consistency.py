@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from pipelines.fit.consistency import Inequality, physical_consistency, pseudo_inertia
-from pipelines.fit.equations import Array
+from pipelines.dynamics.consistency import Inequality
+from pipelines.estimation.consistency import physical_consistency, pseudo_inertia
+from pipelines.io.log import Array
 
 # Three bodies on a line whose torques show a few combinations: what a base set looks like, without an arm.
 ONE = np.eye(10)

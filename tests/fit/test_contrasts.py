@@ -9,11 +9,17 @@ import numpy as np
 import pytest
 from scipy.linalg import helmert
 
-from pipelines.fit.contrasts import CONTRAST, MEAN, Contrasted, Cycle, of_mean
-from pipelines.fit.covariance import Robust, robust_covariance
-from pipelines.fit.equations import Array, Block
-from pipelines.fit.least_squares import fit, solve
-from pipelines.fit.statistics import gather
+from pipelines.estimation.covariance import (
+    CONTRAST,
+    MEAN,
+    Contrasted,
+    Cycle,
+    Robust,
+    of_mean,
+    robust_covariance,
+)
+from pipelines.estimation.least_squares import Block, fit, gather, solve
+from pipelines.io.log import Array
 from tests.fit.problems import CHANNELS, SIGMA, Problem, autoregressive, problem, white
 
 PERIODS, PHASES = 4, 2500

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipelines.fit.convergence import convergence
-from pipelines.fit.equations import split
-from pipelines.fit.least_squares import fit
-from pipelines.fit.statistics import gather_growing
+from pipelines.estimation.least_squares import convergence, fit, gather_growing, split
 from tests.fit.problems import problem, white
 
 

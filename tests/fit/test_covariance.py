@@ -7,10 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from pipelines.fit.covariance import robust_covariance
-from pipelines.fit.equations import Array
-from pipelines.fit.least_squares import fit, solve
-from pipelines.fit.statistics import gather
+from pipelines.estimation.covariance import robust_covariance
+from pipelines.estimation.least_squares import fit, gather, solve
+from pipelines.io.log import Array
 from tests.fit.problems import (
     CHANNELS,
     SIGMA,

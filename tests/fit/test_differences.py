@@ -7,7 +7,7 @@ import math
 import numpy as np
 from scipy import stats
 
-from pipelines.fit.differences import difference, limit_of, standardised
+from pipelines.estimation.bootstrap import difference, limit_of, standardised
 
 TURN = 2.0 * math.pi
 

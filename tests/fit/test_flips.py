@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.fit.flips import by_flips
+from pipelines.estimation.bootstrap import by_flips
 
 
 @pytest.mark.parametrize("blocks", [8, 20])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from pipelines.fit.equations import Array
-from pipelines.fit.varpro import Separable, fit_separable, linear_part
+from pipelines.estimation.varpro import Separable, fit_separable, linear_part
+from pipelines.io.log import Array
 
 T = np.linspace(0.0, 4.0, 400)
 ALPHA, BETA, THETA = 0.7, np.array([2.0, -1.5]), np.log(np.array([0.6, 3.0]))

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pipelines.dynamics.body import Array
-from pipelines.fit.varpro import SeparableFit
+from pipelines.estimation.varpro import SeparableFit
 from pipelines.friction.fit import LawFit
 from pipelines.friction.laws import Law, OneJoint, law_named
 from pipelines.friction.simulation import simulate_joint

@@ -8,11 +8,11 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from pipelines.estimation.nominal import plain_number
 from pipelines.friction.fit import LawEquations
 from pipelines.friction.laws import OneJoint
 from pipelines.friction.model_selection import climb, undecided
 from pipelines.friction.speed_map import coverage
-from pipelines.model.words import plain_number
 from tests.friction.one_joint import JOINT, recorded
 from tests.friction.test_model_selection import plateaus
 

@@ -10,6 +10,7 @@ import pytest
 
 from pipelines import estimate_bps
 from pipelines.dynamics.rrr import rigid_body
+from pipelines.estimation.judgements import excitation
 from pipelines.io.files import Opened, open_log
 from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.io.robot import LinkParameters, format_robot
@@ -17,7 +18,6 @@ from pipelines.io.robot_files import load_robot
 from pipelines.model import plausibility as plausibility_module
 from pipelines.model.clock_offset import Offset, clock_offset
 from pipelines.model.evidence import Evidence
-from pipelines.model.excited import excitation
 from pipelines.model.plausibility import plausibility, plausibility_findings
 from pipelines.model.row_fit import quick_residual, relative_residual, row_fits, sample_motion
 from pipelines.quality.checks import NotTested, Subject

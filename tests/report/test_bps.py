@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from pipelines import estimate_bps
-from pipelines.model.estimation.floor import Beside
-from pipelines.model.estimation.result import Result
+from pipelines.estimation.comparison import Beside
+from pipelines.estimation.result import Result
 from pipelines.report.bps_report import bps_report
 from pipelines.report.render import render_report
 from pipelines.stage import Request, run_stage

@@ -10,8 +10,8 @@ import pytest
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.effects.drives import DriveLag
 from pipelines.errors import InputRejected
+from pipelines.estimation.estimate import Recipe
 from pipelines.io.log import ExperimentLog
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.nominal import fit_nominal
 from pipelines.model.rows.prepare import Logs, Prepared, prepare

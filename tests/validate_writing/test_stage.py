@@ -18,11 +18,11 @@ from pipelines.dynamics.kinematics import serial_chain, tip_position
 from pipelines.dynamics.parameter import Uncertainty
 from pipelines.errors import InputRejected, NothingMatched, RrridError, UsageError
 from pipelines.estimation.motion import Reconstruction, reconstruct
+from pipelines.estimation.result import torques
 from pipelines.io.files import open_log, write_log
 from pipelines.io.log import ExperimentLog, digest_of, recording
 from pipelines.io.model_file import Source, model_text, read_model, write_model
 from pipelines.io.robot import format_robot
-from pipelines.model.estimation.outcome import torques
 from pipelines.report.writing_figures import error_map_figure
 from pipelines.stage import Outcome, Request, run_stage
 from pipelines.validate_writing import STAGE, Result, Settings

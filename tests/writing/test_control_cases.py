@@ -10,10 +10,10 @@ import pytest
 
 from pipelines.dynamics.arm import Arm
 from pipelines.estimation.motion import Reconstruction, reconstruct
+from pipelines.estimation.result import torques
 from pipelines.io.files import open_log
 from pipelines.io.log import ExperimentLog
 from pipelines.io.model_file import read_model
-from pipelines.model.estimation.outcome import torques
 from pipelines.writing.control_cases import (
     CASES,
     case_of,

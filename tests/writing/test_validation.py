@@ -10,8 +10,8 @@ import pytest
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.body import Motion
 from pipelines.estimation.motion import Reconstructed, Reconstruction, reconstruct
+from pipelines.estimation.result import torques
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.estimation.outcome import torques
 from pipelines.writing.task import writing_task
 from pipelines.writing.validation import TorqueValidation, stretches_of, torque_validation
 from sample_logs.make_model import synthetic_arm

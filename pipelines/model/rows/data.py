@@ -31,6 +31,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.dynamics.body import Motion
+from pipelines.estimation.estimate import Recipe, equations_of
 from pipelines.estimation.filters import (
     AMPLE,
     COARSE,
@@ -40,9 +41,9 @@ from pipelines.estimation.filters import (
     prediction_weights,
     thinned,
 )
+from pipelines.estimation.motion import Motions
+from pipelines.estimation.regression import Columns, LogEquations, Rows
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.estimation.logs import Motions, Recipe, equations_of
-from pipelines.model.estimation.regression import Columns, LogEquations, Rows
 
 __all__ = ["END", "PAD", "Data", "Kept", "LogData", "Run", "Whitening", "gather", "run_of"]
 

@@ -22,8 +22,8 @@ import numpy as np
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Motion
 from pipelines.effects.base import ArmModel, Effect, FrictionLaw, Quantity, adds
+from pipelines.estimation.regression import Columns
 from pipelines.io.log import Array
-from pipelines.model.estimation.regression import Columns
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.nominal import (
     Fit,

@@ -21,8 +21,7 @@ import numpy.typing as npt
 
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.effects.base import Effect, FrictionLaw, Values
-from pipelines.fit.bootstrap import apart
-from pipelines.fit.differences import difference
+from pipelines.estimation.bootstrap import apart, difference
 from pipelines.io.log import Array
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.exact import Exact, Named, Which, number_moved, slopes_of

@@ -20,8 +20,8 @@ import numpy as np
 
 from pipelines.effects import find_effect
 from pipelines.effects.base import Effect, plainer
+from pipelines.estimation.regression import Columns
 from pipelines.io.log import Array
-from pipelines.model.estimation.regression import Columns
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.fit import Refined, refine, torque_gain_of

@@ -19,8 +19,8 @@ import numpy as np
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.parameter import Parameter
 from pipelines.effects.base import ArmModel, Effect, FrictionLaw, Quantity, plainer
+from pipelines.estimation.regression import Columns
 from pipelines.io.log import Array
-from pipelines.model.estimation.regression import Columns
 from pipelines.model.rows.data import Data
 
 __all__ = ["Fit", "effect_rows", "fit_columns", "fit_nominal", "law_rows", "law_slopes",

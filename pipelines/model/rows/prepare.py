@@ -25,25 +25,21 @@ import numpy.typing as npt
 from pipelines.dynamics.arm import Arm
 from pipelines.effects.base import FrictionLaw
 from pipelines.errors import InputRejected
-from pipelines.estimation.motion import Reconstructed, reconstruct
-from pipelines.estimation.state_estimation import design
-from pipelines.estimation.tuning import smoother_bandwidth
-from pipelines.io.log import Array, ExperimentLog, recording
-from pipelines.model.estimation.conditioning import cutoff_at
-from pipelines.model.estimation.logs import (
-    FEWEST_OF_JOINT,
-    Motions,
+from pipelines.estimation.config import EstimateConfig, RestConfig
+from pipelines.estimation.estimate import (
     Recipe,
     equations_of,
     motions_of,
     none_left,
-    of_each,
     refuse_too_few,
     with_cutoff,
 )
-from pipelines.model.estimation.nominal import nominal_columns, with_offsets
-from pipelines.model.estimation.regression import Columns
-from pipelines.model.estimation.rests import RestConfig
+from pipelines.estimation.motion import Motions, Reconstructed, reconstruct
+from pipelines.estimation.nominal import nominal_columns, with_offsets
+from pipelines.estimation.regression import Columns, cutoff_at
+from pipelines.estimation.state_estimation import design
+from pipelines.estimation.tuning import smoother_bandwidth
+from pipelines.io.log import Array, ExperimentLog, recording
 from pipelines.model.rows.data import Data, gather
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.nominal import fit_nominal
@@ -122,7 +118,7 @@ def sharpened(motions: Motions, recipe: Recipe) -> Motions:
     cut-off of the equations and these hold its reversals; as they are where there is no cut-off, or no smoother."""
     if recipe.cutoff_hz is None or min(recipe.min_speed) > 0.0:
         return motions
-    return of_each([log for log, _ in motions], lambda place: _sharper(*motions[place], recipe))
+    return tuple((log, _sharper(log, found, recipe)) for log, found in motions)
 
 
 def _sharper(log: ExperimentLog, found: Reconstructed, recipe: Recipe) -> Reconstructed:
@@ -259,7 +255,7 @@ def _all_rows(parts: Sequence[Motions], columns: Columns, recipe: Recipe, still:
 def _enough(rows: Sequence[Data | None]) -> bool:
     """Return whether every joint moves in the fitted logs for as many equations as a fit asks for."""
     data = rows[0]
-    return data is not None and bool((np.bincount(data.joint[data.counts], minlength=data.n_joints) >= FEWEST_OF_JOINT).all())
+    return data is not None and bool((np.bincount(data.joint[data.counts], minlength=data.n_joints) >= EstimateConfig.fewest_of_joint).all())
 
 
 def _refuse_held(motions: Motions, held: Sequence[Joints], fitted: bool) -> None:

@@ -20,11 +20,11 @@ from itertools import chain
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.estimation.estimate import Estimate, estimate
+from pipelines.estimation.judgements import Facts, one_way, predicted_std, unresolved
+from pipelines.estimation.nominal import with_offsets
+from pipelines.estimation.regression import Columns, LogEquations
 from pipelines.io.log import Array
-from pipelines.model.estimation.estimate import Estimate, estimate
-from pipelines.model.estimation.judgeable import Facts, one_way, predicted_std, unresolved
-from pipelines.model.estimation.nominal import with_offsets
-from pipelines.model.estimation.regression import Columns, LogEquations
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.nominal import fit_nominal
 from pipelines.model.rows.prepare import Prepared

@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.estimation.balance import Balance, power_balance
+from pipelines.estimation.config import BalanceConfig
+from pipelines.estimation.estimate import Recipe, fit_logs, motions_of
+from pipelines.estimation.nominal import nominal_columns
 from pipelines.estimation.observers import Reconstruction
 from pipelines.io.log import ExperimentLog
-from pipelines.model.estimation.balance import ALONE, Balance, power_balance
-from pipelines.model.estimation.logs import Recipe, fit_logs, motions_of
-from pipelines.model.estimation.nominal import nominal_columns
 from tests.healthy import with_signal
 from tests.model.estimation.experiments import experiment, truth
 
@@ -35,7 +36,7 @@ def test_a_scaled_acceleration_is_found(gain: float) -> None:
     for seed in SEEDS:
         found = balance_of(experiment(seed), gain)
         assert not found.agree
-        assert max(found.apart) > ALONE
+        assert max(found.apart) > BalanceConfig.alone
         z = (np.array(found.value) - truth(list(found.names))) / found.std
         assert np.abs(z).max() < 4.5, (seed, z)
 

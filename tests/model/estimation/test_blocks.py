@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from pipelines.fit.equations import Array, Block
-from pipelines.model.estimation.blocks import by_blocks, by_stretches
+from pipelines.estimation.held_out import by_blocks, by_stretches
+from pipelines.estimation.least_squares import Block
+from pipelines.io.log import Array
 from tests.fit.problems import CHANNELS, SIGMA, Problem, problem, white
 from tests.seeds import rarely
 

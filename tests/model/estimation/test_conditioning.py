@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.body import Motion
-from pipelines.model.estimation.conditioning import wanted_cutoff
+from pipelines.estimation.regression import wanted_cutoff
 
 RATE = 500.0  # [Hz]
 FASTEST = 5.0  # [Hz]

@@ -7,7 +7,7 @@ from scipy import signal
 
 from pipelines.estimation.motion import reconstruct
 from pipelines.estimation.observers import Reconstruction
-from pipelines.model.estimation.outcome import course, torques
+from pipelines.estimation.result import course, torques
 from tests.healthy import with_signal
 from tests.model.estimation.experiments import arm, experiment
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pipelines.estimation.balance import Balance, power_balance
+from pipelines.estimation.estimate import Recipe, fit_logs, motions_of
+from pipelines.estimation.nominal import nominal_columns
 from pipelines.estimation.observers import Reconstruction
 from pipelines.io.log import Array
-from pipelines.model.estimation.balance import Balance, power_balance
-from pipelines.model.estimation.logs import Recipe, fit_logs, motions_of
-from pipelines.model.estimation.nominal import nominal_columns
 from tests.model.estimation.experiments import arm, experiment, truth
 
 pytestmark = pytest.mark.slow

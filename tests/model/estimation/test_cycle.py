@@ -7,14 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.estimation.covariance import Cycle
+from pipelines.estimation.estimate import Recipe, cycle_of, equations_of
 from pipelines.estimation.mean_period import mean_period
 from pipelines.estimation.motion import Reconstruction, reconstruct
-from pipelines.fit.contrasts import Cycle
+from pipelines.estimation.nominal import nominal_columns
+from pipelines.estimation.regression import LogEquations
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.estimation.cycle import cycle_of
-from pipelines.model.estimation.logs import Recipe, equations_of
-from pipelines.model.estimation.nominal import nominal_columns
-from pipelines.model.estimation.regression import LogEquations
 from tests.healthy import with_signal
 from tests.model.estimation.experiments import arm, motion_of, periodic
 
@@ -27,7 +26,7 @@ def equations(log: ExperimentLog, decimation: int | None = None) -> LogEquations
 
 def apart(one: LogEquations, cycle: Cycle) -> float:
     """[rad] largest distance of a true posture from the mean of those with its phase."""
-    q = motion_of(0)(one.times() + 3.0).q  # where `periodic` begins
+    q = motion_of(0)(one.found.motion.t[one.moments()] + 3.0).q  # where `periodic` begins
     mean = np.zeros((cycle.count, 3))
     np.add.at(mean, cycle.phase, q)
     seen: Array = np.bincount(cycle.phase, minlength=cycle.count)[:, None].astype(np.float64)

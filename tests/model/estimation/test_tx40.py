@@ -11,13 +11,19 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from pipelines.dynamics.rrr import rigid_body
+from pipelines.estimation.estimate import (
+    Estimate,
+    Fitted,
+    Recipe,
+    equations_of,
+    fit_logs,
+    motions_of,
+)
+from pipelines.estimation.nominal import nominal_columns
 from pipelines.estimation.observers import Reconstruction
 from pipelines.import_log import STAGE, Settings
 from pipelines.io.files import open_log
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.estimation.estimate import Estimate
-from pipelines.model.estimation.logs import Fitted, Recipe, equations_of, fit_logs, motions_of
-from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.stage import Request, run_stage
 
 CUTOFF, EVERY = 20.0, 100  # [Hz] of the decimation from 5 kHz to 50 Hz

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pipelines.model.estimation.words import column_in_words
+from pipelines.estimation.nominal import column_in_words
 
 
 @pytest.mark.parametrize(("name", "words"), [

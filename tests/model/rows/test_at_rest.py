@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.estimation.estimate import Recipe
 from pipelines.io.log import Array, Controller, ExperimentLog, Signal
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnosis.asking import answered
 from tests.diagnosis.slides import SLIDE

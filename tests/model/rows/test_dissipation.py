@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from pipelines.effects.friction import Coulomb, TorqueOffset, Viscous
-from pipelines.model.estimation.logs import Recipe
+from pipelines.estimation.estimate import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.fit import Refined, dissipating, driving, refine
 from pipelines.model.rows.nominal import fit_nominal

@@ -10,7 +10,7 @@ import pytest
 from pipelines.dynamics.arm import Acting
 from pipelines.effects import all_effects, find_effect
 from pipelines.effects.base import Effect, adds
-from pipelines.model.estimation.logs import Recipe
+from pipelines.estimation.estimate import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.nominal import fit_nominal
 from pipelines.model.rows.prepare import Logs, Prepared, prepare

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.estimation.estimate import Recipe
 from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.io.files import open_log
 from pipelines.io.log import ExperimentLog, derive
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.prepare import Logs, prepare
 
 

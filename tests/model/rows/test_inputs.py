@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
+from pipelines.estimation.estimate import Recipe
 from pipelines.io.log import ExperimentLog
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnose.sessions import session
 from tests.healthy import with_signal

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.estimation.estimate import Recipe
 from pipelines.io.files import open_log
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.nominal import fit_columns, fit_nominal, rows_of
 from pipelines.model.rows.prepare import Logs, prepare
 from sample_logs.make_model import synthetic_arm

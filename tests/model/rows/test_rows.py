@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from pipelines.dynamics.body import Motion
-from pipelines.model.estimation.logs import Recipe
+from pipelines.estimation.estimate import Recipe
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.nominal import _orthonormal, fit_nominal, rows_of
 from pipelines.model.rows.prepare import Logs, Prepared, prepare

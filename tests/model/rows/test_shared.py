@@ -7,7 +7,7 @@ import pytest
 
 from pipelines.dynamics.body import Array, Motion
 from pipelines.effects import find_effect
-from pipelines.model.estimation.logs import Recipe
+from pipelines.estimation.estimate import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.fit import refine
 from pipelines.model.rows.nominal import fit_nominal

@@ -12,11 +12,11 @@ from bench.draw import draw_machine
 from bench.experiments import excitation
 from bench.machine import Machine
 from bench.plant import Recording, as_log, run
-from pipelines.estimation.motion import Reconstruction
+from pipelines.estimation.estimate import Recipe, motions_of
+from pipelines.estimation.motion import Motions, Reconstruction
+from pipelines.estimation.regression import wanted_cutoff
 from pipelines.estimation.tuning import smoother_bandwidth
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.estimation.conditioning import wanted_cutoff
-from pipelines.model.estimation.logs import Motions, Recipe, motions_of
 from pipelines.model.rows.prepare import sharpened
 
 HOW = Reconstruction()

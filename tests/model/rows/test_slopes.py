@@ -11,7 +11,7 @@ from pipelines.effects.base import Effect
 from pipelines.effects.bodies import GravityTilt
 from pipelines.effects.drives import TorqueGain
 from pipelines.effects.friction import ViscousDrift
-from pipelines.model.estimation.logs import Recipe
+from pipelines.estimation.estimate import Recipe
 from pipelines.model.rows.exact import Exact, slopes_of
 from pipelines.model.rows.fit import refine
 from pipelines.model.rows.nominal import fit_nominal, rigid_rows

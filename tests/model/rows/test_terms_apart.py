@@ -16,9 +16,9 @@ from pipelines.dynamics.body import Motion
 from pipelines.effects.angle import Cogging
 from pipelines.effects.base import Effect
 from pipelines.effects.friction import Coulomb, ThreeSigmoid, TwoSigmoid, Viscous
+from pipelines.estimation.estimate import Recipe
 from pipelines.io.files import open_log
 from pipelines.io.log import Array
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.families import Wanted
 from pipelines.model.rows.fit import Refined, refine

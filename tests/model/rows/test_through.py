@@ -18,8 +18,8 @@ from pipelines.effects.base import Effect
 from pipelines.effects.drives import DriveLag, LoadFriction, TorqueLag
 from pipelines.effects.encoders import EncoderEccentricity, TimeDelay
 from pipelines.effects.friction import Coulomb, ViscousDrift
+from pipelines.estimation.estimate import Recipe
 from pipelines.io.log import Array
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact, nominal_slopes, slopes_of
 from pipelines.model.rows.fit import refine
 from pipelines.model.rows.nominal import fit_nominal, rigid_rows

@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.signal import lfilter
 
-from pipelines.model.estimation.logs import Recipe
+from pipelines.estimation.estimate import Recipe
 from pipelines.model.rows.data import Data, Whitening
 from pipelines.model.rows.families import families, lay_family, whole_motion
 from pipelines.model.rows.prepare import Logs, prepare

@@ -20,7 +20,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Array", "Arrow", "Indices", "Parts", "Structure", "Table", "by_joint", "gains", "in_rows"]
+__all__ = [
+    "Array",
+    "Arrow",
+    "Indices",
+    "Parts",
+    "Structure",
+    "Table",
+    "by_joint",
+    "gains",
+    "in_rows",
+]
 
 _ROUNDING = 1e-13  # numerics: of each number's information: more than sums of 1e5 rows round off
 _ROOM, _AT_ONCE = 4_000_000, 64  # numerics: values in double precision, columns
@@ -131,7 +141,7 @@ class Table:
         return Table(self.width, tuple(pieces))
 
     def compact(self) -> Table:
-        """Return the columns in order and single precision, in one piece: of candidates there are many."""
+        """Return the columns in order and single precision, in one piece."""
         return Table(self.width, tuple((_joined(own),) for own in self.pieces))
 
     def _each(self, change: Callable[[Indices, npt.NDArray[Any]], Piece]) -> Pieces:
@@ -163,7 +173,9 @@ class Table:
             count = len(part[j]) if part else _rows(mine)
             for rows in _runs(count, self.width + other.width):
                 chosen = rows if part is None else rows.start + np.flatnonzero(part[j][rows])
-                right = [(k, np.asarray(b[:, chosen].T, dtype=np.float64)) for k, b in theirs if len(k)]
+                right = [
+                    (k, np.asarray(b[:, chosen].T, dtype=np.float64)) for k, b in theirs if len(k)
+                ]
                 for i, a in (own for own in mine if len(own[0])):
                     left = np.asarray(a[:, chosen], dtype=np.float64)
                     for k, b in right:
@@ -171,14 +183,17 @@ class Table:
         return out
 
     def squares(self, groups: Sequence[slice], part: Parts | None = None) -> tuple[Array, ...]:
-        """Return A Aᵀ of each group of neighbouring columns, in single precision; `part` as in `gram`."""
+        """Return A Aᵀ of each group of neighbouring columns, in single precision."""
         out = tuple(np.zeros((g.stop - g.start, g.stop - g.start)) for g in groups)
         for j, ((index, values),) in enumerate(self.compact().pieces):
             rows = slice(None) if part is None else part[j]
             for g, total in zip(groups, out, strict=True):
                 first, last = np.searchsorted(index, [g.start, g.stop])
                 if first < last:
-                    own, at = values[first:last, rows].astype(np.float64), index[first:last] - g.start
+                    own, at = (
+                        values[first:last, rows].astype(np.float64),
+                        index[first:last] - g.start,
+                    )
                     total[np.ix_(at, at)] += own @ own.T
         return out
 
@@ -353,7 +368,7 @@ class Arrow:
 
 
 def _root(matrix: Array) -> Array:
-    """Return the Cholesky factor of a matrix whose diagonal is larger by what its sums round off."""
+    """Return the Cholesky factor of a matrix with a diagonal larger by its rounding."""
     more = _ROUNDING * np.diag(np.diag(matrix))
     return np.asarray(np.linalg.cholesky(matrix + more), dtype=np.float64)
 

@@ -1,4 +1,4 @@
-"""Minimise a sum of squares within bounds, by a trust region (Branch, Coleman, Li 1999, SIAM J. Sci. Comput. 21, p. 1)."""
+"""Minimise sums of squares within bounds (Branch, Coleman, Li 1999, SIAM J. Sci. Comput. 21)."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Minimum", "least_between", "least_squares"]
-
-Array = npt.NDArray[np.float64]
+from pipelines.io.log import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,8 +21,14 @@ class Minimum:
     at_bound: npt.NDArray[np.bool_]  # (parameters,)
 
 
-def least_squares(rest: Callable[[Array], Array], start: Array, low: Array | float = -np.inf, high: Array | float = np.inf,
-                  scale: Array | None = None, steps: int | None = None) -> Minimum:
+def least_squares(
+    rest: Callable[[Array], Array],
+    start: Array,
+    low: Array | float = -np.inf,
+    high: Array | float = np.inf,
+    scale: Array | None = None,
+    steps: int | None = None,
+) -> Minimum:
     """Return the minimum next to `start`.
 
     Args:
@@ -41,13 +45,18 @@ def least_squares(rest: Callable[[Array], Array], start: Array, low: Array | flo
     if not np.isfinite(rest(start)).all():
         raise np.linalg.LinAlgError("the residual is no number where the search starts")
 
-    found = optimize.least_squares(rest, start, bounds=(low, high), x_scale="jac" if scale is None else scale, max_nfev=steps)
+    sizes = "jac" if scale is None else scale
+    bounds = (low, high)
+    found = optimize.least_squares(rest, start, bounds=bounds, x_scale=sizes, max_nfev=steps)
     return Minimum(found.x, found.fun, found.jac, np.asarray(found.active_mask != 0))
 
 
-def least_between(loss: Callable[[float], float], low: float, high: float, tolerance: float) -> float:
+def least_between(
+    loss: Callable[[float], float], low: float, high: float, tolerance: float
+) -> float:
     """Return where `loss` of one number is smallest between two, to `tolerance` (Brent 1973)."""
     from scipy import optimize
 
-    found = optimize.minimize_scalar(loss, bounds=(low, high), method="bounded", options={"xatol": tolerance})
+    options = {"xatol": tolerance}
+    found = optimize.minimize_scalar(loss, bounds=(low, high), method="bounded", options=options)
     return float(found.x)

@@ -1,0 +1,443 @@
+"""Estimate base parameters and friction from several logs; judge the fit on others.
+
+    recipe = with_cutoff(Recipe(how), motions)
+    fitted = fit_logs(motions, columns, recipe)      fit, covariance, what is visible
+    judged = judge(fitted, others, blocks)           held-out errors
+
+Kostić et al. 2004, eq. (12)-(15): the equations of all logs stacked, joints weighted by their own
+residual; every log is reconstructed and conditioned alike. Memory is constant in the samples, but
+for logs whose motion repeats: the covariance holds a period of equations of each, one log after the
+other, so it grows with the period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from pipelines.dynamics.body import Motion
+from pipelines.errors import InputRejected, UsageError
+from pipelines.estimation.config import EstimateConfig
+from pipelines.estimation.covariance import Contrasted, Cycle, Robust, robust_covariance
+from pipelines.estimation.filters import KEEP
+from pipelines.estimation.held_out import Stretches, by_blocks, by_stretches
+from pipelines.estimation.identifiability import (
+    Unresolved,
+    condition_number,
+    typical_size,
+    unresolved,
+    visible,
+)
+from pipelines.estimation.least_squares import (
+    Block,
+    Convergence,
+    Errors,
+    Flags,
+    Solution,
+    Statistics,
+    Triangles,
+    convergence,
+    fit,
+    gather,
+    gather_growing,
+    split,
+)
+from pipelines.estimation.motion import Motions, Reconstructed, Reconstruction, reconstruct
+from pipelines.estimation.regression import (
+    Columns,
+    LogEquations,
+    Rows,
+    condition,
+    cutoff_at,
+    wanted_cutoff,
+)
+from pipelines.io.log import Array, ExperimentLog
+
+__all__ = ["Motions"]
+
+_CONFIG = EstimateConfig()
+_KEPT = 4 << 20  # numerics: [B] of conditioned equations; longer ones are made at every pass
+_WHOLE = 1e-6  # numerics: of an equation, beyond a whole number of them a period
+
+
+class Stacked:
+    """The equations of several logs, one after the other; kept in memory where they are few."""
+
+    def __init__(self, logs: Sequence[Iterable[Block]]) -> None:
+        self.logs = logs
+        self._kept: list[tuple[int, Block]] | None = []
+
+    def __iter__(self) -> Iterator[Block]:
+        for _, block in self.numbered():
+            yield block
+
+    def numbered(self) -> Iterator[tuple[int, Block]]:
+        """Yield each block with the place of its log."""
+        if self._kept:
+            yield from self._kept
+            return
+        kept, size = [], 0
+        for place, log in enumerate(self.logs):
+            for block in log:
+                size += sum(v.nbytes for v in block.values)
+                if size <= _KEPT:
+                    kept.append((place, block))
+                else:
+                    kept.clear()
+                yield place, block
+        self._kept = kept if size <= _KEPT else None
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Parameters, how well they are known, and how well they explain their equations."""
+
+    columns: Columns
+    solution: Solution
+    robust: Robust
+    statistics: Statistics
+    equations: Stacked
+
+    @property
+    def beta(self) -> Array:
+        return self.solution.beta
+
+    @property
+    def std(self) -> Array:
+        return self.robust.std
+
+    @cached_property
+    def visible(self) -> Flags:
+        """(k,) whether the logs show the parameter: its value, or that it is small."""
+        names = self.columns.names
+        kinds = [one.unit + one.name.partition(":")[0].rstrip("0123456789") for one in names]
+        known = visible(self.beta, self.std, typical_size(self.beta, self.std, kinds))
+        return np.asarray(known & self.trusted)
+
+    @cached_property
+    def unresolved(self) -> Unresolved:
+        names = [column.name for column in self.columns.names]
+        return unresolved(self.solution, names, float(self.robust.inflation.max()))
+
+    @cached_property
+    def trusted(self) -> Flags:
+        """(k,) whether the logs determine the parameter; any other is the smallest that fits."""
+        lost = set(self.unresolved.parameters)
+        kept = [column.name not in lost for column in self.columns.names]
+        return np.asarray(kept & self.solution.determined)
+
+    @cached_property
+    def condition_number(self) -> float:
+        """Of Φ in (13): rigid columns, unweighted, SI."""
+        return condition_number(self.statistics, self.columns.rigid)
+
+    def convergence(self) -> Convergence:
+        """Return how the estimates settle as samples come in, Fig. 12."""
+        parts = _CONFIG.parts
+        blocks = split(self.equations, max(1, self.statistics.samples // parts))
+        inflation = self.robust.inflation
+        return convergence(gather_growing(blocks, parts), self.solution, inflation)
+
+
+def estimate(logs: Sequence[Iterable[Block]], columns: Columns, weighted: bool = True) -> Estimate:
+    """Fit the equations of `logs`; without `weighted` every joint counts alike, as in eq. (15).
+
+    Where a motion repeats, the covariance is no smaller than that of its periods one after the
+    other. Turned by phases it knows what repeats, but takes a period for all that its noise
+    remembers; in the order of time it is the other way round. Each tells too little where the other
+    holds, and where both hold they agree.
+    """
+    stacked = Stacked(logs)
+    weights = None if weighted else np.ones(columns.body.robot.n_joints)
+    fitted = fit(stacked, weights=weights, gram=gather(stacked))
+    solution, longest = fitted.solution, fitted.statistics.longest
+    robust = robust_covariance(stacked, solution, longest)
+    cycles = tuple(map(cycle_of, logs))
+    if any(cycles):
+        turned = Contrasted(stacked.numbered, cycles)
+        by_phases = robust_covariance(turned, solution, turned.longest(longest))
+        robust = by_phases.at_least(robust)
+    return Estimate(columns, solution, robust, fitted.statistics, stacked)
+
+
+def cycle_of(equations: Iterable[Block]) -> Cycle | None:
+    """Return the phase of every equation; None where no phase comes again, or none is known.
+
+    A period comes but once where none is given, or the log is their mean already. One of a few
+    phases makes no spectrum, and where the motion does not repeat after it, equations of one phase
+    have nothing in common: the attribute is wrong. A period need be no whole number of equations:
+    those of one phase then lie up to half a step from it, an eighth of the shortest period that the
+    low-pass lets through.
+    """
+    if not isinstance(equations, LogEquations) or equations.found.mean is not None:
+        return None
+    log, moments = equations.found.good.log, equations.moments()
+    t, q = equations.found.motion.t[moments], equations.found.motion.q[moments]
+    if log.period is None or len(t) == 0 or t[-1] - t[0] <= log.period:
+        return None
+    step = log.sample_time * equations.conditioning.decimation
+    count = int(np.ceil(log.period / step - _WHOLE))
+    if count < _CONFIG.phases:
+        return None
+    phase = np.rint((t - t[0]) / log.period * count).astype(np.intp) % count
+    # positions of one phase scatter by little of what they do in all; n of them with n - 1 degrees
+    # of freedom
+    seen = np.bincount(phase, minlength=count)
+    mean = np.zeros((count, q.shape[1]))
+    np.add.at(mean, phase, q)
+    mean /= np.maximum(seen, 1)[:, None]
+    free = max(len(q) - np.count_nonzero(seen), 1)
+    within = np.sqrt(np.square(q - mean[phase]).sum(axis=0) / free)
+    allowed = np.maximum(_CONFIG.repeats * q.std(axis=0), _CONFIG.still)
+    return Cycle(phase, count) if np.all(within <= allowed) else None
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How a log becomes equations. None: found from the logs that are fitted."""
+
+    how: Reconstruction = field(default_factory=Reconstruction)
+    cutoff_hz: float | None = None
+    decimation: int | None = None
+    min_speed: tuple[float, ...] = (0.0,)
+    # torque (samples, joints) [N m] that is subtracted: of a given friction
+    known: Callable[[Motion], Array] | None = None
+    orders: int = 0  # [1/rev] of a torque that a found cut-off lets through at the fastest speed
+    lowest_hz: float = 0.0  # of a cut-off that is found
+    highest_hz: float = np.inf
+    found: bool = False  # the cut-off, or that there is none, came of the fitted logs
+    keep: float = KEEP  # samples left in a period of the cut-off, where no decimation is given
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """The estimate, and the motions it came from."""
+
+    estimate: Estimate
+    motions: Motions
+    recipe: Recipe  # with the cut-off that was used
+    errors: Errors  # on the logs that were fitted
+    weighted: bool  # joints by their own residual
+
+    @property
+    def cutoff_hz(self) -> float | None:
+        return self.recipe.cutoff_hz
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """How the estimate does on what it was not fitted to."""
+
+    errors: Errors
+    by: str  # "logs" | "blocks"
+    stretches: Stretches  # of time, in order
+    motions: Motions
+    equations: tuple[LogEquations, ...]  # that judge; none where blocks of the fitted logs do
+
+
+class EquationSettings(Protocol):
+    """The settings that stages share which make equations of logs; None where left open."""
+
+    @property
+    def cutoff_hz(self) -> float | None: ...
+
+    @property
+    def decimate(self) -> int | None: ...
+
+    @property
+    def min_speed(self) -> tuple[float, ...]: ...
+
+    @property
+    def blocks(self) -> int: ...
+
+
+def refuse_strange(given: EquationSettings) -> None:
+    """C02: a number that no log can be done with, before any log is opened."""
+    if given.blocks < 2:
+        words = "1 block" if given.blocks == 1 else f"{given.blocks} blocks"
+        raise UsageError("C02", words, "--blocks", "give 2 or more")
+    if not all(0.0 <= speed < np.inf for speed in given.min_speed):
+        words = "a speed that is no number from zero up"
+        raise UsageError("C02", words, "--min-speed", "give 0 or more [rad/s]")
+    if given.decimate is not None and given.decimate < 1:
+        words = f"every {given.decimate}th sample"
+        raise UsageError("C02", words, "--decimate", "give 1 or more")
+    if given.cutoff_hz is not None and not 0.0 < given.cutoff_hz < np.inf:
+        words = f"a low-pass at {given.cutoff_hz:g} Hz"
+        raise UsageError("C02", words, "--cutoff-hz", "give a frequency above 0")
+
+
+def refuse_unfit(given: EquationSettings, log: ExperimentLog) -> None:
+    """C02: what no log of this rate and so many joints can be done with."""
+    if len(given.min_speed) not in (1, log.n_joints):
+        words = f"{len(given.min_speed)} values for {log.n_joints} joints"
+        raise UsageError("C02", words, "--min-speed", "give one, or one a joint")
+    highest = _CONFIG.highest / log.sample_time
+    if given.cutoff_hz is not None and not given.cutoff_hz < highest:
+        rate = f"{1.0 / log.sample_time:g} Hz"
+        words = f"a low-pass at {given.cutoff_hz:g} Hz for {log.name}, sampled at {rate}"
+        limit = f"{_CONFIG.highest:g} of the rate, {highest:g} Hz"
+        remedy = f"give a frequency above 0 and below {limit}"
+        raise UsageError("C02", words, "--cutoff-hz", remedy)
+
+
+def motions_of(logs: Sequence[ExperimentLog], how: Reconstruction) -> Motions:
+    """Return each log with its motion.
+
+    Raises:
+        UsageError, InputRejected: as `reconstruct`, of the first log that it cannot be done for.
+    """
+    return tuple((log, reconstruct(log, how)) for log in logs)
+
+
+def with_cutoff(recipe: Recipe, motions: Motions) -> Recipe:
+    """Return the recipe with the highest cut-off that any of these logs, or ripple, needs."""
+    if recipe.found or recipe.cutoff_hz is not None:
+        return recipe
+    wanted, turning = [recipe.lowest_hz], 0.0
+    for log, found in motions:
+        wanted.append(wanted_cutoff(found.motion, 1.0 / log.sample_time))
+        speed = np.abs(found.motion.dq[:, list(log.robot.revolute)]).max(initial=0.0)
+        turning = max(turning, float(speed))
+    wanted.append(recipe.orders * turning / (2.0 * np.pi))
+    highest = min(max(wanted), recipe.highest_hz)
+    felt = any(cutoff_at(highest, 1.0 / log.sample_time) is not None for log, _ in motions)
+    return replace(recipe, cutoff_hz=highest if felt else None, found=True)
+
+
+def equations_of(
+    motions: Motions, recipe: Recipe, columns: Columns, rows: Sequence[Rows] | None = None
+) -> list[LogEquations]:
+    """Return the equations of every log; of the samples in `rows` where those are given.
+
+    Raises:
+        InputRejected: T04, every stretch of a log is too short for the low-pass, or spoilt.
+    """
+    slow = np.broadcast_to(np.array(recipe.min_speed), columns.body.robot.n_joints)
+    cutoff = np.inf if recipe.found and recipe.cutoff_hz is None else recipe.cutoff_hz
+    found_equations = []
+    for k, (log, found) in enumerate(motions):
+        rate = 1.0 / log.sample_time
+        how = condition(found.motion, rate, cutoff, recipe.decimation, slow, recipe.keep)
+        chosen, held = None if rows is None else rows[k], log.torque != "measured"
+        equations = LogEquations(columns, found, how, held, recipe.known, chosen)
+        if not equations.runs:
+            words = f"no stretch without a gap outlasts the low-pass at {how.cutoff_hz:.3g} Hz"
+            remedy = "filter higher with --cutoff-hz, or record longer"
+            raise InputRejected("T04", words, log.source or log.name, remedy)
+        if equations.rows.out.all():
+            raise none_left(log, found)
+        found_equations.append(equations)
+    return found_equations
+
+
+def none_left(log: ExperimentLog, found: Reconstructed, few: bool = False) -> InputRejected:
+    """Return the refusal of a log of which no sample is left, or so `few` that no row is."""
+    saturated = bool(found.good.saturated.any(axis=1).mean() > _CONFIG.mostly)
+    what = "saturated torque" if saturated else "what is missing or spoilt"
+    words = f"no sample is left: {what} touches {'nearly every one' if few else 'every one'}"
+    remedy = "'rrrid inspect' shows what is wrong; record again"
+    if saturated:
+        remedy = "drive it more gently"
+    return InputRejected("D05" if saturated else "T04", words, log.source or log.name, remedy)
+
+
+def refuse_too_few(
+    equations: Sequence[LogEquations], motions: Motions, fewest: int = _CONFIG.fewest
+) -> None:
+    """Check before a fit that enough equations are left, in all and of every joint.
+
+    Args:
+        fewest: equations in all.
+
+    Raises:
+        InputRejected: T08, too few equations are left for a fit, in all or of a joint.
+    """
+    log = motions[0][0]
+    where = log.source or log.name
+    limit = np.max([one.conditioning.min_speed for one in equations], axis=0)
+    slow = np.all([one.rows.slow.all(axis=0) for one in equations], axis=0) & (limit > 0.0)
+    if slow.any():
+        j = int(np.argmax(slow))
+        speeds = [np.abs(found.motion.dq[found.good.kept, j]).max() for _, found in motions]
+        unit = "rad/s" if log.robot.joints[j].revolute else "m/s"
+        words = f"no equation of joint {j + 1} is left: its largest speed is {max(speeds):.3g} "
+        words += f"{unit}, --min-speed asks for {limit[j]:g}"
+        remedy = "give less; one value a joint, where their speeds differ"
+        raise InputRejected("T08", words, where, remedy)
+    counts = np.sum([one.counts * one.repeats for one in equations], axis=0)
+    j = int(np.argmin(counts))
+    if counts[j] < _CONFIG.fewest_of_joint:
+        words = f"{counts[j]:.0f} equations of joint {j + 1} are left"
+        remedy = "lower --min-speed or --decimate, or record longer"
+        raise InputRejected("T08", words, where, remedy)
+    if counts.sum() < fewest:
+        words = f"{counts.sum():.0f} equations are left, too few for a fit"
+        remedy = "lower --decimate, filter higher with --cutoff-hz, or record longer"
+        raise InputRejected("T08", words, where, remedy)
+
+
+def fit_logs(
+    motions: Motions,
+    columns: Columns,
+    recipe: Recipe,
+    weighted: bool = True,
+    rows: Sequence[Rows] | None = None,
+) -> Fitted:
+    """Fit the logs; a cut-off that is not given is the highest that any of them needs.
+
+    Raises:
+        InputRejected: T04, a log without a stretch that can be used; T08, too few equations.
+    """
+    recipe = with_cutoff(recipe, motions)
+    equations = equations_of(motions, recipe, columns, rows)
+    refuse_too_few(equations, motions)
+    found = estimate(equations, columns, weighted)
+    errors = _of_whole_torque(found.solution.errors, equations)
+    return Fitted(found, motions, recipe, errors, weighted)
+
+
+def judge(
+    fitted: Fitted, motions: Motions, blocks: int, rows: Sequence[Rows] | None = None
+) -> Judged:
+    """Return held-out errors: on other logs, or on blocks of the fitted ones without others."""
+    found = fitted.estimate
+    if not motions:
+        own = [one for one in found.equations.logs if isinstance(one, LogEquations)]
+        left = by_blocks(
+            found.equations,
+            found.statistics.samples,
+            blocks,
+            max(one.guard for one in own),
+            triangles=isinstance(found.statistics, Triangles),
+            weighted=fitted.weighted,
+        )
+        return Judged(_of_whole_torque(left.errors, own), "blocks", left, (), ())
+    equations = equations_of(motions, fitted.recipe, found.columns, rows)
+    samples, stretches = sum(one.samples for one in equations), max(blocks, _CONFIG.stretches)
+    left = by_stretches(Stacked(equations), samples, stretches, found.beta)
+    errors = _of_whole_torque(left.errors, equations)
+    return Judged(errors, "logs", left, motions, tuple(equations))
+
+
+def _of_whole_torque(found: Errors, equations: Sequence[LogEquations]) -> Errors:
+    """Return the errors relative to the whole torque [N m], where a part had been subtracted.
+
+    Equations of a mean period are scaled by the root of its periods.
+    """
+    if any(one.known is not None for one in equations):
+        whole = gather(Stacked([replace(one, known=None) for one in equations]))
+        counts = np.maximum(whole.counts, 1)
+        relative = np.sqrt(np.sum(np.square(found.rms) * counts) / whole.power.sum())
+        signal = np.sqrt(whole.power / counts)
+        found = replace(found, signal_rms=signal, relative_error=float(relative))
+    if all(one.repeats == 1 for one in equations):
+        return found
+    rows = np.sum([one.counts for one in equations], axis=0)
+    whole_rows = np.sum([one.counts * one.repeats for one in equations], axis=0)
+    shrink = np.sqrt(rows / np.maximum(whole_rows, 1))
+    return replace(found, rms=found.rms * shrink, signal_rms=found.signal_rms * shrink)

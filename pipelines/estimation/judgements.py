@@ -1,0 +1,203 @@
+"""Judge an estimate: whether logs can clear an arm, and whether friction comes out negative.
+
+    why = cannot_judge(facts)                  in words, with what to record; empty where they can
+    for check in negative_viscous(found, where): ...
+    for finding in excited(subject): ...       D09 of a log, by the equations of `estimate-bps`
+
+"No fault found" says that a model leaves no more torque than that of a healthy arm would. That
+takes a noise floor, from reference logs, or a model that leaves next to nothing on held-out motion
+but what differs between repeated periods; and a model that the logs determine. One that they do not
+determine predicts held-out torque with a large standard deviation:
+
+    std τ̂_j(t) = sqrt(a_j(t)ᵀ C a_j(t)),  a_j the regressor of joint j, C the covariance of β
+
+(Draper & Smith 1998, ch. 3.1; C allows for autocorrelation). Misfit and standard deviation are both
+a share of the joint's torque, so that one number decides.
+
+Friction takes power, so a viscous coefficient below zero is no friction: the torque has the wrong
+sign, was compensated for friction, is late behind the motion, or the model lacks a law of friction
+whose torque falls with speed. It is reported where it is significant by the standard deviation that
+allows for autocorrelation, where the logs determine it, and where it stays so with a second Coulomb
+law of the widest change of sign: at speeds within that width, viscous friction only mends the shape
+of the change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.effects import find_effect
+from pipelines.effects.base import everywhere
+from pipelines.errors import Check, InputRejected
+from pipelines.estimation import identifiability
+from pipelines.estimation.config import JudgeableConfig
+from pipelines.estimation.estimate import Estimate, Recipe, equations_of, estimate, with_cutoff
+from pipelines.estimation.least_squares import Block, Flags
+from pipelines.estimation.motion import Reconstruction, reconstruct
+from pipelines.estimation.nominal import columns_in_words, nominal_columns
+from pipelines.estimation.regression import LogEquations
+from pipelines.io.log import Array, recording
+from pipelines.quality.subject import NotTested, Subject
+
+_CONFIG = JudgeableConfig()
+REMEDY = "move the joints concerned further and faster, in more postures, and all of them at once"
+_RECORD = "record reference logs while the arm is known to be healthy, "
+_RECORD += "or a motion that repeats itself"
+
+
+@dataclass(frozen=True, eq=False)
+class Facts:
+    """Errors of a model on held-out motion, and the state of its noise floor.
+
+    Arrays (joints,) are root mean squares [N m], of prismatic joints [N].
+    """
+
+    left: Array  # residual of the nominal model
+    torque: Array  # measured
+    std: Array  # of the predicted torque, by the covariance of the parameters
+    unresolved: str  # parameters that the logs do not separate, in words; empty: none
+    floor_known: Flags  # (joints,) whether the residual can be held against a noise floor
+
+
+def unresolved(found: Estimate) -> str:
+    """Return which parameters the fitted logs do not separate, in words; empty where they do."""
+    return found.unresolved.told(columns_in_words(one.name for one in found.columns.names))
+
+
+def one_way(found: Estimate) -> str:
+    """Return which friction is linearly dependent on an offset, for its joint moves one way.
+
+    The constant gravity of a vertical slide is an offset too, and no reason to doubt a model.
+    """
+    names = [one.name for one in found.columns.names]
+    lost = identifiability.unresolved(found.solution, names, 0.0)
+    # no base parameters
+    friction = tuple(group for group in lost.confused if all(":" in name for name in group))
+    return replace(lost, never_moved=(), confused=friction).told(columns_in_words(names))
+
+
+def predicted_std(found: Estimate, equations: Iterable[Block]) -> Array:
+    """Return the rms [N m] (joints,) of the predicted torque's deviation over `equations`.
+
+    Parameters that the fitted logs do not determine at all have no covariance: they count as known
+    here, and are listed as unresolved.
+    """
+    covariance = found.robust.covariance
+    covariance = np.where(np.isfinite(covariance), covariance, 0.0)
+    variance, count = np.zeros((2, found.columns.body.robot.n_joints))
+    for block in equations:
+        for j, (index, values) in enumerate(zip(block.columns, block.values, strict=True)):
+            variance[j] += np.sum(values * (covariance[np.ix_(index, index)] @ values))
+        count += block.counts
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0) / np.maximum(count, 1.0)))
+
+
+def cannot_judge(facts: Facts, config: JudgeableConfig = _CONFIG) -> str:
+    """Return why nothing can be said of the arm, and what to record; empty where it can be."""
+    limit, why = config.largest_share, []
+    misfit = _large(np.where(facts.floor_known, 0.0, facts.left), facts.torque, limit)
+    if misfit:
+        words = "no noise floor is known, and on held-out motion the model leaves "
+        why.append(f"{words}{misfit}, as a fault may and a healthy arm may; {_RECORD}")
+    unsure = _large(facts.std, facts.torque, limit)
+    if facts.unresolved or unsure:
+        said = [facts.unresolved] if facts.unresolved else []
+        if unsure:
+            words = "its prediction of held-out torque has a standard deviation of"
+            said.append(f"{words} {unsure}")
+        why.append(f"the logs do not determine the model: {'; '.join(said)}; {REMEDY}")
+    return "; and ".join(why)
+
+
+def _large(part: Array, torque: Array, limit: float) -> str:
+    """Return "25 % of the torque of joint 1, 12 % of joint 3": shares above the limit."""
+    share = part / np.maximum(torque, 1e-300)
+    joints = np.flatnonzero(share > limit).tolist()
+    words = ", ".join(f"{100.0 * share[j]:.2g} % of joint {j + 1}" for j in joints)
+    return words.replace(" of joint", " of the torque of joint", 1)
+
+
+def negative_viscous(
+    found: Estimate, where: str, config: JudgeableConfig = _CONFIG
+) -> tuple[Check, ...]:
+    """Return a check, D15, of every joint whose viscous friction is significantly negative."""
+    places = _negative(found, config.least_std)
+    if not places:
+        return ()
+    coulomb, columns = find_effect("coulomb"), found.columns
+    widest = next(q.low for q in coulomb.parameters if q.name == "sharpness")
+    laws = everywhere(coulomb, columns.body.robot.revolute)
+    wide = [replace(law, sharpness=widest) for law in laws]  # type: ignore[call-arg]
+    columns = replace(columns, laws=(*columns.laws, *wide))
+    logs = [replace(log, columns=columns) for log in equations_of_logs(found)]
+    sure = _negative(estimate(logs, columns), config.least_std)
+    checks, names = [], found.columns.names
+    for k in (k for k in places if k in sure):
+        joint = names[k].name.split(":")[1]
+        size = f"{found.beta[k]:.3g} ± {found.std[k]:.2g} {names[k].unit}"
+        words = f"viscous friction of joint {joint} is negative, {size}: it would drive the joint"
+        remedy = "look whether the logged torque of this joint has the other sign, is compensated "
+        remedy += "for friction, or is late behind the position; else its friction falls with "
+        remedy += "speed, and the model lacks that law"
+        checks.append(Check.of("D15", "warn", words, where, remedy, gate=True))
+    return tuple(checks)
+
+
+def _negative(found: Estimate, least: float) -> Sequence[int]:
+    """Return the places of the viscous coefficients that are determined and negative."""
+    below = found.trusted & (found.beta < -least * found.std)
+    names = enumerate(found.columns.names)
+    return [k for k, column in names if column.name.startswith("viscous:") and below[k]]
+
+
+def equations_of_logs(found: Estimate) -> list[LogEquations]:
+    """Return the equations that an estimate was made of."""
+    return [log for log in found.equations.logs if isinstance(log, LogEquations)]
+
+
+def excited(subject: Subject) -> Sequence[Check | NotTested]:
+    """D09 of an "excitation" log: that every base parameter and friction shows, or what does not.
+
+    The motion is that of the quickest filter, which costs a tenth of a smoother; low-pass, columns,
+    weights and what counts as lost in the noise are those of an estimate.
+    """
+    if subject.log.experiment != "excitation":
+        return []
+    try:
+        found = excitation(subject)
+    except InputRejected as why:
+        return subject.cannot_tell("D09", why.message)
+    words = [unresolved(found)]
+    # what sways within its dry friction has columns of friction, and they are made of it
+    steps = np.array([step or 0.0 for step in subject.good.steps])
+    least = np.maximum(_CONFIG.least_travel, _CONFIG.steps * steps)
+    still = np.flatnonzero(subject.travel < least) + 1
+    lost = found.unresolved.parameters
+    held = [str(joint) for joint in still if f"coulomb:{joint}:level" not in lost]
+    if held:
+        joints = f"joints {', '.join(held)} hardly move"
+        joints = joints if len(held) > 1 else f"joint {held[0]} hardly moves"
+        words.append(f"{joints}, which shows nothing of friction")
+    condition, said = found.solution.condition, "; ".join(filter(None, words))
+    number = f"condition number {condition:.3g}"
+    if not said:
+        fine = f"every base parameter and friction shows, {number} (unit columns)"
+        return subject.ok("D09", fine)
+    number = f" ({number}, unit columns)" if np.isfinite(condition) else ""
+    words_of = f"insufficient excitation: {said}{number}"
+    return [subject.say("D09", "warn", words_of, gate=True, remedy=REMEDY)]
+
+
+def excitation(subject: Subject) -> Estimate:
+    """Return what `estimate-bps` fits to this log alone.
+
+    Raises:
+        InputRejected: T04, T05, a log of which no equations can be made.
+    """
+    log, how = recording(subject.log), Reconstruction(method="zero-phase")
+    motions = ((log, reconstruct(log, how, subject.good)),)
+    columns = nominal_columns(log.robot)
+    return estimate(equations_of(motions, with_cutoff(Recipe(how), motions), columns), columns)

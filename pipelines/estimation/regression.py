@@ -1,0 +1,428 @@
+"""Make the equations of a log that a fit takes: τ = Y β, averaged, filtered and thinned out alike.
+
+    columns = nominal_columns(robot)                    rigid body, friction laws at every joint
+    for block in LogEquations(columns, found, ...):     iterate as often as needed
+
+Kostić et al. 2004, eq. (12)-(14). A held command acts from its sample to the next, so that against
+states at t_k it comes half a sample late: ½ (τ_k + τ_{k-1}) is centred, and the same average is
+taken of every column. The low-pass is zero-phase, and the same over torque and columns: what it
+takes from one it takes from the other (Gautier 1997). Memory is constant in the samples.
+
+A torque beyond the limit of a drive may not have been given. Such samples make no equations, nor do
+those next to them. Where a controller winds up, the command is many times the limit, and what is
+put in its place differs by so much that the low-pass carries it farther than a bad sample: rows
+depend on it where the torque as commanded and the torque bridged differ behind the low-pass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+
+from pipelines.dynamics.body import Array, Motion, RigidBody
+from pipelines.dynamics.rrr import ACTING, RRR
+from pipelines.effects.base import ArmModel, Effect
+from pipelines.estimation.config import RegressionConfig
+from pipelines.estimation.covariance import of_mean
+from pipelines.estimation.filters import (
+    KEEP,
+    LowPass,
+    centre_hold,
+    centre_samples,
+    choose_decimation,
+    choose_step,
+    design_low_pass,
+    zero_phase,
+)
+from pipelines.estimation.least_squares import Block, Flags, Indices
+from pipelines.estimation.motion import Reconstructed, known_median
+from pipelines.io.limits import GAP_TICKS
+
+_CONFIG = RegressionConfig()
+_SEED = 20040509  # numerics
+_BLOCK = 32768  # numerics: samples of the log worked on at once
+_SETTLE = 10.0  # numerics: periods of the cut-off after which a low-pass has forgotten to 1e-10
+
+
+@dataclass(frozen=True)
+class Conditioning:
+    """The filter and decimation of torque and columns. See `condition` for the defaults."""
+
+    low_pass: LowPass | None
+    cutoff_hz: float | None
+    decimation: int
+    step: Fraction  # samples between rows that are thinned out in the frequency domain
+    min_speed: tuple[float, ...]  # [rad/s] slower samples of a joint make no equations of it
+
+
+def condition(
+    motion: Motion,
+    rate: float,
+    cutoff_hz: float | None,
+    decimation: int | None,
+    min_speed: Array,
+    keep: float = KEEP,
+) -> Conditioning:
+    """Return the filter for a log, its cut-off from the motion where none is given.
+
+    There is none where the rate is too low for it.
+
+    Args:
+        keep: samples left in a period of the cut-off, where no decimation is given.
+    """
+    cutoff = cutoff_at(wanted_cutoff(motion, rate) if cutoff_hz is None else cutoff_hz, rate)
+    speeds = tuple(map(float, min_speed))
+    if cutoff is None:
+        return Conditioning(None, None, decimation or 1, Fraction(decimation or 1), speeds)
+    every = decimation or choose_decimation(cutoff, rate, keep)
+    step = Fraction(decimation) if decimation else choose_step(cutoff, rate, keep)
+    return Conditioning(design_low_pass(cutoff, rate), cutoff, every, step, speeds)
+
+
+def cutoff_at(cutoff_hz: float | None, rate: float) -> float | None:
+    """Return a cut-off that logs share, for one of `rate`; None where it is above its band."""
+    return cutoff_hz if cutoff_hz is not None and cutoff_hz < _CONFIG.highest * rate else None
+
+
+def wanted_cutoff(motion: Motion, rate: float) -> float:
+    """Return the cut-off [Hz] that leaves all that `motion` excites.
+
+    The torque of the rigid body has harmonics of the motion: five times f keeps them, where 99.9 %
+    of the power of the speed is below f, and leaves out what only noise and structure fill. Dry
+    friction follows the direction of motion alone, and its harmonics end nowhere: of a square wave
+    those from the n-th on hold 4 / (π² n) of the power. They tell friction from weight where the
+    motion is slow, and are kept as far as arms do not bend.
+    """
+    known = np.isfinite(motion.dq).all(axis=1)
+    t, dq = motion.t[known], motion.dq[known]
+    size = dq.std(axis=0)
+    dq, size = dq[:, size > 0.0], size[size > 0.0]
+    speed = (dq - dq.mean(axis=0)) / size
+    rigid = 5.0 * _highest_frequency(t, speed, rate, _CONFIG.speed_share)
+    if rigid >= _CONFIG.stiff_hz or not size.size:
+        return rigid
+    # joints by their speed: the noise of one that is held has no direction
+    direction = np.tanh(dq / (_CONFIG.reversal * np.abs(dq).max(axis=0))) * size
+    dry = _highest_frequency(t, direction - direction.mean(axis=0), rate, _CONFIG.dry_share)
+    return max(rigid, min(dry, _CONFIG.stiff_hz))
+
+
+def _highest_frequency(t: Array, x: Array, rate: float, share: float) -> float:
+    """Return the frequency [Hz] below which `share` of the power of `x` (samples, joints) lies.
+
+    Of stretches without a gap, each by itself: end to end, a jump would count as the fastest
+    motion. Short ones, whose own ends are that as well, count only where there are no longer ones;
+    where a few samples are lost, a straight line does.
+    """
+    stretches = []
+    cut = 1 + np.flatnonzero(np.diff(t) > GAP_TICKS / rate)
+    for own, part in zip(np.split(t, cut), np.split(x, cut), strict=True):
+        if len(own) >= 2 and np.diff(own).max() >= 1.5 / rate:
+            even = np.arange(own[0], own[-1] + 0.5 / rate, 1.0 / rate)
+            part = np.stack([np.interp(even, own, column) for column in part.T], axis=1)
+        stretches.append(part)
+    longest = max(map(len, stretches))
+    power = np.zeros(longest // 2 + 1)
+    for part in stretches:
+        if len(part) >= _CONFIG.short * longest:
+            bins = np.fft.rfft(part * np.hanning(len(part))[:, None], longest, axis=0)
+            power += np.sum(np.abs(bins) ** 2, axis=1)
+    total = np.cumsum(power)
+    if total[-1] <= 0.0:
+        return rate
+    return float(np.searchsorted(total, share * total[-1]) + 1) * rate / longest
+
+
+@dataclass(frozen=True)
+class Column:
+    """One parameter of the equations."""
+
+    name: str  # "p3", or by place and name: "viscous:2:coefficient"
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """The columns of equations: the rigid body's, or some of them, and every law's amplitudes."""
+
+    body: RigidBody
+    kept: tuple[int, ...]  # of the body's parameters
+    laws: tuple[Effect, ...]
+    arm: ArmModel  # what the laws depend on
+
+    @cached_property
+    def names(self) -> tuple[Column, ...]:
+        parameters, turning = self.body.parameters, self.body.robot.revolute
+        found = [Column(parameters[i].name, parameters[i].unit) for i in self.kept]
+        for law in self.laws:
+            place = f"{law.name}:{law.joint}" if law.joint else law.name
+            turns = law.joint is None or turning[law.joint - 1]
+            amplitudes = (q for q in law.parameters if not q.shape)
+            found += [Column(f"{place}:{q.name}", q.unit_at(turns)) for q in amplitudes]
+        return tuple(found)
+
+    @property
+    def rigid(self) -> range:
+        """Places of the rigid columns among all."""
+        return range(len(self.kept))
+
+    def rows(self, motion: Motion) -> tuple[tuple[Array, ...], tuple[Indices, ...]]:
+        """Return the columns that act on each joint (columns, samples), and which they are."""
+        values, places = self._rigid_rows(motion)
+        first = len(self.kept)
+        added: list[list[Array]] = [[v] for v in values]
+        where: list[list[int]] = [p.tolist() for p in places]
+        for law in self.laws:
+            table = law.columns(motion, self.arm)
+            joints = range(table.shape[1]) if law.joint is None else (law.joint - 1,)
+            for j in joints:
+                added[j] += list(table[:, j].T)
+                where[j] += range(first, first + table.shape[2])
+            first += table.shape[2]
+        tables = tuple(np.vstack(own) if len(own) > 1 else own[0] for own in added)
+        return tables, tuple(np.array(index, dtype=np.intp) for index in where)
+
+    @cached_property
+    def _acting(self) -> Flags:
+        """(joints, parameters) which columns of the body act on a joint: at random states."""
+        states = np.random.default_rng(_SEED).uniform(-3.0, 3.0, (3, 16, self.body.robot.n_joints))
+        return np.asarray(self.body.regressor(*states).any(axis=0))
+
+    def _rigid_rows(self, motion: Motion) -> tuple[list[Array], list[Indices]]:
+        if isinstance(self.body, RRR):
+            room = np.empty((28, len(motion.t)))
+            rows = self.body.acting_rows(motion.q, motion.dq, motion.ddq, room)
+            acting = [np.array(columns, dtype=np.intp) for columns in ACTING]
+        else:
+            table = self.body.regressor(motion.q, motion.dq, motion.ddq).transpose(1, 2, 0)
+            acting = [np.flatnonzero(row) for row in self._acting]
+            rows = tuple(table[j, index] for j, index in enumerate(acting))
+        place = np.full(len(self.body.parameters), -1, dtype=np.intp)
+        place[list(self.kept)] = np.arange(len(self.kept))
+        keep = [place[index] >= 0 for index in acting]
+        return (
+            [row[k] for row, k in zip(rows, keep, strict=True)],
+            [place[index[k]] for index, k in zip(acting, keep, strict=True)],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Which samples of the mended log make equations."""
+
+    out: Flags  # (samples,) none: spoilt, vague, or so near to it that the low-pass spreads it here
+    slow: Flags  # (samples, joints) none of this joint: too slow, or near torque that may be cut
+
+    def __and__(self, other: Rows) -> Rows:
+        """Return samples that make equations in both."""
+        return Rows(self.out | other.out, self.slow | other.slow)
+
+
+@dataclass(frozen=True, eq=False)
+class LogEquations:
+    """The equations of one log. Iterable as often as needed."""
+
+    columns: Columns
+    found: Reconstructed
+    conditioning: Conditioning
+    held: bool  # the torque is a held command: centre it
+    # torque (samples, joints) [N m] that is subtracted: of a given friction
+    known: Callable[[Motion], Array] | None = None
+    chosen: Rows | None = None  # instead of the log's own choice: the same for several motions
+
+    def __iter__(self) -> Iterator[Block]:
+        noise = 0 if self.found.mean is None else of_mean(self.repeats)
+        for run in self.runs:
+            for values, y, used in self._pieces(run):
+                if len(y[0]):
+                    yield Block(len(self.columns.names), self._places, values, y, used, noise)
+
+    @cached_property
+    def runs(self) -> tuple[slice, ...]:
+        """Stretches without a gap that outlast the low-pass."""
+        low_pass = self.conditioning.low_pass
+        shortest = 8 if low_pass is None else 2 * low_pass.padding
+        return tuple(run for run in self.found.good.runs if run.stop - run.start > shortest)
+
+    @cached_property
+    def rows(self) -> Rows:
+        """The samples that make equations."""
+        if self.chosen is not None:
+            return self.chosen
+        good, how = self.found.good, self.conditioning
+        spoilt = (good.missing | good.spikes | good.saturated) | self._unknown
+        touched = np.asarray(spoilt.any(axis=1))
+        out, reach = np.ones(len(touched), dtype=bool), 2
+        if how.cutoff_hz is not None:
+            reach = int(np.ceil(_CONFIG.touched / (how.cutoff_hz * good.log.sample_time)))
+        for run in self.runs:
+            count = np.cumsum(np.pad(touched[run].astype(np.float64), (reach + 1, reach)))
+            out[run] = count[2 * reach + 1 :] > count[: -2 * reach - 1]
+        if (mean := self.found.mean) is not None:  # the rest are copies
+            out[: mean.first] = out[mean.last :] = True
+        slow = np.abs(self.found.motion.dq[good.kept]) < np.array(how.min_speed)
+        slow = slow if self.found.stuck is None else slow | self.found.stuck
+        return Rows(out, slow | self._near_peaks(~(out[:, None] | slow)))
+
+    def _near_peaks(self, rows: Flags) -> Flags:
+        """(samples, joints) too near to torque beyond its limit; none where nothing spreads it."""
+        good, low_pass = self.found.good, self.conditioning.low_pass
+        near = np.zeros_like(rows)
+        if low_pass is None:
+            return near
+        for j in np.flatnonzero(good.saturated.any(axis=0)):
+            beyond, lost = good.saturated[:, j, None], (good.missing | good.spikes)[:, j, None]
+            commanded = bridged(good.log.tau[:, j, None], lost)
+            least = _CONFIG.matters * float(np.where(beyond, 0.0, np.abs(commanded)).max())
+            differ = commanded - bridged(commanded, beyond | lost)
+            depends = np.zeros(len(rows), dtype=bool)
+            for run in self.runs:
+                depends[run] = np.abs(zero_phase(differ[run], low_pass))[:, 0] > least
+            if np.sum(rows[:, j] & ~depends) > _CONFIG.few * np.sum(rows[:, j]):
+                near[:, j] = depends
+        return near
+
+    @cached_property
+    def counts(self) -> Indices:
+        """(joints,) about how many equations there are of each joint, before any is made."""
+        found = np.zeros(self.rows.slow.shape[1], dtype=np.intp)
+        for run in self.runs:
+            thin = slice(run.start, run.stop, self.conditioning.decimation)
+            found += np.sum(~self.rows.out[thin, None] & ~self.rows.slow[thin], axis=0)
+        return found
+
+    @property
+    def counted(self) -> tuple[slice, ...]:
+        """The runs without what is a copy of a mean period."""
+        if (mean := self.found.mean) is None:
+            return self.runs
+        ends = [(max(run.start, mean.first), min(run.stop, mean.last)) for run in self.runs]
+        return tuple(slice(*end) for end in ends)
+
+    @property
+    def repeats(self) -> float:
+        """Periods of which an equation is the mean; by its root all have noise of one strength."""
+        return 1 if self.found.mean is None else self.found.mean.periods
+
+    @property
+    def samples(self) -> int:
+        """Moments that make equations of any joint."""
+        return sum(len(self._moments(run)) for run in self.runs)
+
+    @property
+    def guard(self) -> int:
+        """Equations apart, from which on two share no noise: what a low-pass spreads."""
+        how, step = self.conditioning, self.found.good.log.sample_time
+        reach = 2.0 * _CONFIG.touched / how.cutoff_hz if how.cutoff_hz else _CONFIG.memory
+        return int(np.ceil(reach / (step * how.decimation)))
+
+    def moments(self) -> Indices:
+        """Return the sample of the recording of every equation."""
+        every = np.concatenate([self._moments(run) for run in self.runs])
+        return np.asarray(self.found.good.kept[every])
+
+    def _moments(self, run: slice) -> Indices:
+        """Return the samples of the mended log that make equations of any joint."""
+        end, every = int(self.held), self.conditioning.decimation
+        moments = np.arange(run.start + end, run.stop - end)[-end % every :: every]
+        return np.asarray(moments[~self.rows.out[moments]])
+
+    @cached_property
+    def _places(self) -> tuple[Indices, ...]:
+        start = self.runs[0].start
+        return self.columns.rows(self._motion(slice(start, start + 8)))[1]
+
+    def _pieces(
+        self, run: slice
+    ) -> Iterator[tuple[tuple[Array, ...], tuple[Array, ...], tuple[Flags, ...] | None]]:
+        """Yield the columns and torque of each joint, and which count, conditioned and thinned."""
+        how, rate = self.conditioning, 1.0 / self.found.good.log.sample_time
+        margin = 2 if how.cutoff_hz is None else int(np.ceil(_SETTLE * rate / how.cutoff_hz))
+        inner = _BLOCK - _BLOCK % how.decimation
+        length = run.stop - run.start
+        for first in range(0, length, inner):
+            last = min(first + inner, length)
+            if length - last < margin:  # a short rest joins the stretch before it
+                last = length
+            begin, end = max(0, first - margin), min(length, last + margin)
+            wide = slice(run.start + begin, run.start + end)
+            yield self._conditioned(wide, run.start + first, run.start + last, -first)
+            if last == length:
+                return
+
+    def _conditioned(
+        self, wide: slice, first: int, last: int, phase: int
+    ) -> tuple[tuple[Array, ...], tuple[Array, ...], tuple[Flags, ...] | None]:
+        how = self.conditioning
+        motion, tau = self.stretch(wide)
+        rows, begin = self.columns.rows(motion)[0], 0
+        known = None if self.known is None else self.known(motion)
+        if self.held:  # the first and the last sample have no neighbour to be averaged with
+            rows, tau, begin = tuple(centre_samples(row.T).T for row in rows), centre_hold(tau), 1
+            known = None if known is None else centre_samples(known)
+        if known is not None:
+            tau = tau - known
+        stacks = [np.vstack([row, u]).T for row, u in zip(rows, tau.T, strict=True)]
+        if how.low_pass is not None:
+            stacks = [zero_phase(s, how.low_pass) for s in stacks]
+        inside = np.arange(len(stacks[0])) + wide.start + begin - first - phase % how.decimation
+        span = last - first - phase % how.decimation
+        chosen = np.flatnonzero((inside >= 0) & (inside < span) & (inside % how.decimation == 0))
+        keep = chosen[~self.rows.out[wide][chosen + begin]]
+        slow = self.rows.slow[wide][keep + begin]
+        scale, parts = np.sqrt(self.repeats), []
+        for j, stack in enumerate(stacks):
+            own = stack[keep] if scale == 1.0 else scale * stack[keep]
+            parts.append(np.where(slow[:, j, None], 0.0, own))
+        values = tuple(np.ascontiguousarray(p[:, :-1].T) for p in parts)
+        y = tuple(np.ascontiguousarray(p[:, -1]) for p in parts)
+        return values, y, tuple(~slow.T) if slow.any() else None
+
+    @cached_property
+    def _unknown(self) -> Flags:
+        """(samples, joints) of the mended log: no motion, or a vague one."""
+        kept, motion = self.found.good.kept, self.found.motion
+        finite = np.isfinite(motion.q + motion.dq + motion.ddq)[kept]
+        return np.asarray(~finite | self.found.vague[kept])
+
+    @cached_property
+    def _lost(self) -> Flags:
+        """(samples, joints) of the mended log where the position is not known either."""
+        found, kept = self.found, self.found.good.kept
+        lost = ~np.isfinite(found.motion.q)[kept]
+        if found.std is None:
+            return np.ones_like(lost)
+        std = found.std[0][kept]
+        return np.asarray(lost | ~(std <= _CONFIG.lost * known_median(std)))
+
+    def _motion(self, stretch: slice) -> Motion:
+        """Return the motion at the samples of a stretch of the mended log."""
+        rows, m = self.found.good.kept[stretch], self.found.motion
+        return replace(m, t=m.t[rows], q=m.q[rows], dq=m.dq[rows], ddq=m.ddq[rows])
+
+    def stretch(self, wide: slice) -> tuple[Motion, Array]:
+        """Return motion and torque with what is spoilt bridged by straight lines."""
+        good, motion = self.found.good, self._motion(wide)
+        tau = good.log.tau[wide]
+        spoilt = (good.missing | good.spikes | good.saturated)[wide]
+        unknown = self._unknown[wide]
+        if not (spoilt | unknown).any():
+            return motion, tau
+        # where the acceleration is vague the position need not be: friction with a memory starts
+        # from where the joint was
+        q = bridged(motion.q, unknown & self._lost[wide])
+        dq, ddq = (bridged(x, unknown) for x in (motion.dq, motion.ddq))
+        return Motion(motion.t, q, dq, ddq), bridged(tau, spoilt)
+
+
+def bridged(x: Array, bad: Flags) -> Array:
+    """Return `x` (samples, joints) with straight lines where it is bad; 0 of one all bad."""
+    out, place = x.copy(), np.arange(len(x))
+    for j in np.flatnonzero(bad.any(axis=0)):
+        ill = bad[:, j]
+        out[ill, j] = 0.0 if ill.all() else np.interp(place[ill], place[~ill], x[~ill, j])
+    return out

@@ -1,1 +1,0 @@
-"""Matrices in, estimates out: least squares, identifiability. No robot words."""

@@ -1,1 +1,0 @@
-"""From logs to parameters: the equations, the fit, what it can show, and what checks it."""
