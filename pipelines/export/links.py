@@ -13,7 +13,7 @@ links in the log-determinant divergence, which no choice of frames or units chan
     minimise  Σ_i tr(J0_i⁻¹ J_i) - log det J_i     where  B φ = p
 
 It is its own barrier. Where no links have p, those are taken whose p is nearest to it in standard
-deviations (`pipelines.fit.consistency`).
+deviations (`pipelines.estimation.consistency`).
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from pipelines.dynamics.altered import chain_of
 from pipelines.dynamics.body import Array, RigidBody
 from pipelines.dynamics.chain import STANDARD, regressor
 from pipelines.dynamics.kinematics import SerialChain
+from pipelines.estimation.consistency import physical_consistency, pseudo_inertia
 from pipelines.export.config import EXPORT
-from pipelines.fit.consistency import physical_consistency, pseudo_inertia
 from pipelines.io.robot import RobotDescription, inconsistency_of_link
 
 __all__ = ["Links", "carried", "consistent_links", "prior_links"]
