@@ -22,12 +22,12 @@ from pipelines.dynamics.altered import carry_over
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.body import Array, Motion
 from pipelines.errors import Check, InputRejected, UsageError, did_you_mean
+from pipelines.estimation.links import Links, carried, consistent_links, prior_links
 from pipelines.estimation.motion import reconstruct
 from pipelines.estimation.observers import Reconstruction
 from pipelines.export.c_code import C
 from pipelines.export.card import Card, Consistency, LinkValue, Proof, Replay, card
 from pipelines.export.config import EXPORT
-from pipelines.export.links import Links, carried, consistent_links, prior_links
 from pipelines.export.mjcf import mjcf
 from pipelines.export.states import course, random_states
 from pipelines.export.table import TABLE
@@ -234,7 +234,7 @@ def _checks(result: Card) -> tuple[Check, ...]:
     if said.impossible:
         words = f"no body could have the described link of {', '.join(said.impossible)}"
         found.append(Check.of("S17", "warn", words, result.robot, "correct the description"))
-    if not said.met:
+    if said.conflicts:
         words = "no links that could exist have these base parameters: the nearest ones are"
         words = f"{words} {said.distance:.2g} standard deviations away; the conflict is at"
         remedy = "look for a cause that the model lacks, or record longer excitation"

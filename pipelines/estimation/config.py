@@ -215,3 +215,15 @@ class JudgeableConfig:
     least_std: float = 3.0
     least_travel: float = 1e-3  # [rad or m] a joint that moves less is held
     steps: float = 50.0  # encoder steps, the same
+
+
+@dataclass(frozen=True)
+class LinksConfig:
+    """What is assumed of links that nothing describes, and where links cease to exist."""
+
+    mass: float = 1.0  # [kg] torque shows no such mass
+    radius: float = 0.1  # [m] of a ball
+    thin: float = 1e-3  # of a ball's second moment, that a point or a rod is given
+    relative: float = 1e-3  # std of a base parameter without one, of the largest
+    inside: float = 0.1  # of the distance to what exists, to be inside of it
+    seed: int = 1  # of the states at which base parameters are compared

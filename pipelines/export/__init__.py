@@ -1,6 +1,5 @@
 """Export a model: URDF, MJCF, C99 or JSON, each with a card and a proof.
 
-links.py     standard parameters of links that could exist, behind the base parameters
 target.py    the arm as a target holds it, and what becomes of each cause
 urdf.py      a URDF, loaded again in Pinocchio
 mjcf.py      an MJCF model, loaded again in MuJoCo

@@ -24,6 +24,7 @@ from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Motion
 from pipelines.dynamics.chain import spatial_inertia
 from pipelines.dynamics.functions import Functions
+from pipelines.effects.base import Effect
 from pipelines.export.config import EXPORT
 from pipelines.export.target import Held, Loaded, Target
 
@@ -137,7 +138,7 @@ class _Program:
         arm = held.arm
         for acting in reversed(arm.effects):
             if acting.effect.name in _ENCODERS:
-                _ENCODERS[acting.effect.name](self, acting, self._joint(acting), acting.values)
+                self._read(acting)
         self.rigid = self._rigid()
         self.tau = np.array([0.0] * len(self.q), dtype=object)
         self.friction: _Vector = None  # of all laws, known when effects come
@@ -148,28 +149,77 @@ class _Program:
             if acting.effect.name not in _ENCODERS:
                 self._load(acting)
 
-    @staticmethod
-    def _joint(acting: Acting) -> int:
-        return (acting.effect.joint or 1) - 1
+    def _read(self, acting: Acting) -> None:
+        """Correct position, speed and acceleration by what an encoder misreads."""
+        j, x, m = (acting.effect.joint or 1) - 1, acting.values, self.m
+        q, v, a = self.q, self.v, self.a
+        match acting.effect.name:
+            case "encoder_eccentricity":  # q_measured = q + A sin(q + φ), solved for q
+                size, phase, measured = x["amplitude"], x["phase"], q[j]
+                for _ in range(_ROUNDS):
+                    q[j] = measured - size * m.sin(q[j] + phase)
+                slope = 1.0 + size * m.cos(q[j] + phase)
+                v[j] = v[j] / slope
+                a[j] = (a[j] + size * m.sin(q[j] + phase) * v[j] * v[j]) / slope
+            case "encoder_crosstalk":  # q_j = q_measured,j - c q_i
+                for state in (q, v, a):
+                    state[j] -= x["coefficient"] * state[int(x["from_joint"]) - 1]
+            case _:  # a delay, q(t) = q_measured(t + Δ), to second order: the jerk is not known
+                q[j] += x["delay"] * (v[j] + 0.5 * x["delay"] * a[j])
+                v[j] += x["delay"] * a[j]
 
     def _load(self, acting: Acting) -> None:
         """Add what a cause makes of the torque so far."""
-        effect, values, j = acting.effect, acting.values, self._joint(acting)
-        if effect.name in _LOADS:
-            _LOADS[effect.name](self, acting, j, values)
-        elif (curve := effect.speed_curve(values)) is not None:
-            self.tau[j] += curve.of(self.v[j], self.m)
-        elif (load := effect.own_load(values)) is not None:
-            self.tau[j] += load(self.q[j], self.v[j], self.m)
-        elif (own := effect.own_memory(values)) is not None:
-            step = self.lines.value("dt")
-            now = self.lines.value(f"state->memory[{len(self.memory)}]")
-            half = now + 0.5 * step * own.rate(now, self.v[j], self.m)
-            bound = 1.0 + values.get("breakaway", 0.0)  # as far as it can bend
-            then = self.m.smaller(now + step * own.rate(half, self.v[j], self.m), bound)
-            then = self.m.larger(then, -bound)
-            self.memory.append(then)
-            self.tau[j] += own.load(then, own.rate(then, self.v[j], self.m))
+        effect, x, j = acting.effect, acting.values, (acting.effect.joint or 1) - 1
+        tau, v, m = self.tau, self.v, self.m
+        match effect.name:
+            case "load_friction":  # µ |τ_l| tanh(w v) / (1 - i µ c)
+                side, into = m.tanh(x["sharpness"] * v[j]), x["input_side"] * x["mu"]
+                load = self.rigid[j]
+                if self.friction is not None:  # as a law of friction it knows neither s nor i
+                    load = tau[j] - (1.0 - x["behind"]) * self.friction[j]
+                    side = side / (1.0 - into * (m.sign(load) * side)) if into else side
+                tau[j] += x["mu"] * abs(load) * side
+            case "rotor_inertia":
+                tau[j] += x["inertia"] * self.a[j]
+            case "viscous_drift":  # r Fv (1 - e^(-t/T)) v
+                change = effect.curve(np.array([1.0]), self.held.arm.nominal, x).item()
+                left = m.exp(m.larger(self.t, 0.0) * (-1.0 / x["time_constant"]))
+                tau[j] += change * (1.0 - left) * v[j]
+            case "transmission_coupling":  # J ds/dt + B s + C tanh(w s), s = v_j + ρ v_i
+                unit = effect.simulate(self.held.arm, {**x, "inertia": 1.0}).inertia
+                i = int(x["with_joint"]) - 1
+                ratio = 1.0 if unit is None else float(unit[j, i])
+                s = v[j] + ratio * v[i]
+                shared = x["inertia"] * (self.a[j] + ratio * self.a[i]) + x["viscous"] * s
+                shared += x["coulomb"] * m.tanh(x["sharpness"] * s)
+                tau[j] += shared
+                tau[i] += ratio * shared
+            case "torque_gain":
+                tau[j] = tau[j] / (1.0 + x["gain_error"])
+            case "torque_crosstalk":
+                tau[j] += x["coefficient"] * tau[int(x["from_joint"]) - 1]
+            case "torque_saturation":
+                inside = m.smaller(m.larger(tau[j], -x["limit"]), x["limit"])
+                tau[j] += x["coefficient"] * (tau[j] - inside)
+            case _:
+                tau[j] += self._own(effect, x, j)
+
+    def _own(self, effect: Effect, x: Mapping[str, float], j: int) -> Any:
+        """Return a load that follows from the joint's own motion."""
+        if (curve := effect.speed_curve(x)) is not None:
+            return curve.of(self.v[j], self.m)
+        if (load := effect.own_load(x)) is not None:
+            return load(self.q[j], self.v[j], self.m)
+        own, step = effect.own_memory(x), self.lines.value("dt")
+        assert own is not None  # by `_carry`
+        now = self.lines.value(f"state->memory[{len(self.memory)}]")
+        half = now + 0.5 * step * own.rate(now, self.v[j], self.m)
+        bound = 1.0 + x.get("breakaway", 0.0)  # as far as it can bend
+        then = self.m.smaller(now + step * own.rate(half, self.v[j], self.m), bound)
+        then = self.m.larger(then, -bound)
+        self.memory.append(then)
+        return own.load(then, own.rate(then, self.v[j], self.m))
 
     def _rigid(self) -> _Vector:
         """Return the torque of the rigid body (joints,), by recursion outwards and back.
@@ -209,99 +259,15 @@ class _Program:
         return tau
 
 
-_Values = Mapping[str, float]
-_Writer = Callable[[_Program, Acting, int, _Values], None]
-
-
-def _load_friction(o: _Program, acting: Acting, j: int, values: _Values) -> None:
-    """µ |τ_l| tanh(w v) / (1 - i µ c), as in `LoadFriction`; a law of friction knows no i."""
-    side, load, lost = o.m.tanh(values["sharpness"] * o.v[j]), o.rigid[j], 1.0
-    if o.friction is not None:
-        load = o.tau[j] - (1.0 - values["behind"]) * o.friction[j]
-        into = values["input_side"] * values["mu"]
-        lost = 1.0 - into * (o.m.sign(load) * side) if into else 1.0
-    o.tau[j] += values["mu"] * abs(load) * side / lost
-
-
-def _rotor(o: _Program, acting: Acting, j: int, values: _Values) -> None:
-    o.tau[j] += values["inertia"] * o.a[j]
-
-
-def _coupling(o: _Program, acting: Acting, j: int, values: _Values) -> None:
-    """J ds/dt + B s + C tanh(w s), s = v_j + ρ v_i, on both joints."""
-    i = int(values["with_joint"]) - 1
-    unit = acting.effect.simulate(o.held.arm, {**values, "inertia": 1.0}).inertia
-    ratio = 1.0 if unit is None else float(unit[j, i])
-    s, ds = o.v[j] + ratio * o.v[i], o.a[j] + ratio * o.a[i]
-    torque = values["inertia"] * ds + values["viscous"] * s
-    torque += values["coulomb"] * o.m.tanh(values["sharpness"] * s)
-    o.tau[j] += torque
-    o.tau[i] += ratio * torque
-
-
-def _drift(o: _Program, acting: Acting, j: int, values: _Values) -> None:
-    """r Fv (1 - e^(-t/T)) v, t since the session began."""
-    change = acting.effect.curve(np.array([1.0]), o.held.arm.nominal, values).item()
-    grown = 1.0 - o.m.exp(o.m.larger(o.t, 0.0) * (-1.0 / values["time_constant"]))
-    o.tau[j] += change * grown * o.v[j]
-
-
-def _gain(o: _Program, acting: Acting, j: int, values: _Values) -> None:
-    o.tau[j] = o.tau[j] / (1.0 + values["gain_error"])
-
-
-def _torque_crosstalk(o: _Program, acting: Acting, j: int, values: _Values) -> None:
-    o.tau[j] += values["coefficient"] * o.tau[int(values["from_joint"]) - 1]
-
-
-def _saturation(o: _Program, acting: Acting, j: int, values: _Values) -> None:
-    inside = o.m.smaller(o.m.larger(o.tau[j], -values["limit"]), values["limit"])
-    o.tau[j] += values["coefficient"] * (o.tau[j] - inside)
-
-
-def _eccentric(o: _Program, acting: Acting, j: int, values: _Values) -> None:
-    """q_measured = q + A sin(q + φ), solved for q; speed and acceleration with it."""
-    size, phase, read = values["amplitude"], values["phase"], o.q[j]
-    for _ in range(_ROUNDS):
-        o.q[j] = read - size * o.m.sin(o.q[j] + phase)
-    slope = 1.0 + size * o.m.cos(o.q[j] + phase)
-    o.v[j] = o.v[j] / slope
-    o.a[j] = (o.a[j] + size * o.m.sin(o.q[j] + phase) * o.v[j] * o.v[j]) / slope
-
-
-def _encoder_crosstalk(o: _Program, acting: Acting, j: int, values: _Values) -> None:
-    """q_j = q_measured,j - c q_i."""
-    for state in (o.q, o.v, o.a):
-        state[j] -= values["coefficient"] * state[int(values["from_joint"]) - 1]
-
-
-def _delay(o: _Program, acting: Acting, j: int, values: _Values) -> None:
-    """q(t) = q_measured(t + Δ) to second order: the jerk is not known."""
-    by = values["delay"]
-    o.q[j] += by * (o.v[j] + 0.5 * by * o.a[j])
-    o.v[j] += by * o.a[j]
-
-
-_LOADS: dict[str, _Writer] = {
-    "load_friction": _load_friction,
-    "rotor_inertia": _rotor,
-    "viscous_drift": _drift,
-    "transmission_coupling": _coupling,
-    "torque_gain": _gain,
-    "torque_crosstalk": _torque_crosstalk,
-    "torque_saturation": _saturation,
-}
-_ENCODERS: dict[str, _Writer] = {
-    "encoder_eccentricity": _eccentric,
-    "encoder_crosstalk": _encoder_crosstalk,
-    "time_delay": _delay,
-}
+_LOADS = {"load_friction", "rotor_inertia", "viscous_drift", "transmission_coupling"}
+_LOADS |= {"torque_gain", "torque_crosstalk", "torque_saturation"}
+_ENCODERS = {"encoder_eccentricity", "encoder_crosstalk", "time_delay"}
 
 
 def _carry(acting: Acting) -> Acting | None:
     """Return a cause that the C function has."""
     effect, values = acting.effect, acting.values
-    if effect.name in _LOADS or effect.name in _ENCODERS:
+    if effect.name in _LOADS | _ENCODERS:
         return acting
     own = (effect.speed_curve, effect.own_load, effect.own_memory)
     return acting if effect.joint and any(f(values) is not None for f in own) else None

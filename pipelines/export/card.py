@@ -38,7 +38,7 @@ class Consistency:
 
     met: bool  # they have; else the file holds the nearest ones
     distance: float  # [standard deviations] between these and the estimate
-    conflicts: tuple[str, ...]  # joints whose links keep them apart
+    conflicts: tuple[str, ...]  # joints whose links keep them apart; none within the uncertainty
     impossible: tuple[str, ...]  # joints whose described links no body could be
     assumed: tuple[str, ...]  # joints whose links nothing describes
     cost: Array | None  # [N m] (joints,) torque error rms of the nearest ones
@@ -94,16 +94,14 @@ class Card:
 
 def card(result: Card) -> Report:
     """Return the card: causes, proof, links, validity."""
-    good = result.proof is not None and not result.count("lost") and result.consistency.met
-    tables = {
-        "Causes": [_causes(result)],
-        "Proof": _proof(result),
-        "Links": [_links(result)],
-        "Validity": [_validity(result)],
-    }
+    good = (
+        not result.consistency.conflicts and result.proof is not None and not result.count("lost")
+    )
     sections = [
-        Section(title, paragraphs("export", title.lower(), result), tuple(own))
-        for title, own in tables.items()
+        Section("Causes", paragraphs("export", "causes", result), (_causes(result),)),
+        Section("Proof", paragraphs("export", "proof", result), _proof(result)),
+        Section("Links", paragraphs("export", "links", result), (_links(result),)),
+        Section("Validity", paragraphs("export", "validity"), (_validity(result),)),
     ]
     if result.notes:
         sections.append(Section("Differences from the description", result.notes))
@@ -125,7 +123,7 @@ def _causes(result: Card) -> Table:
     return Table(columns, tuple(rows), keeps_empty=True)
 
 
-def _proof(result: Card) -> list[Table]:
+def _proof(result: Card) -> tuple[Table, ...]:
     shown = {"torque rms": result.torque_rms, "error of the file": result.torque_error}
     caption = f"Torque of the model on {result.motion}, and how far the file is off [N m]."
     tables = [_by_joint(result.joints, shown, caption)]
@@ -133,7 +131,7 @@ def _proof(result: Card) -> list[Table]:
         shown = {"measured, rms": one.torque_rms, "error of the model": one.model_error}
         shown["error of the file"] = one.export_error
         tables.append(_by_joint(result.joints, shown, f"The log {one.name}, replayed [N m]."))
-    return tables
+    return tuple(tables)
 
 
 def _by_joint(joints: Sequence[Cell], shown: Mapping[str, Array | None], caption: str) -> Table:

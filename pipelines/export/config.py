@@ -9,7 +9,7 @@ __all__ = ["EXPORT"]
 
 @dataclass(frozen=True)
 class ExportConfig:
-    """Limits of the proof, and what is assumed where neither logs nor description say."""
+    """Limits of the proof, and the range where neither logs nor description say one."""
 
     states: int = 1000  # random states at which the exported file is compared
     seed: int = 1  # of the states and of the motion
@@ -21,15 +21,8 @@ class ExportConfig:
     acceleration: float = 10.0  # [rad/s^2] the same
     travel: float = 0.5  # [m] the same, of a prismatic joint
     explained: float = 0.5  # share of a cause that columns of the target must hold: else it is lost
-    mass: float = 1.0  # [kg] of a link that nothing describes: torque shows no such mass
-    radius: float = 0.1  # [m] of that link, a ball
-    relative: float = 1e-3  # std of a base parameter without one, of the largest
-    # of the described link that is added to one at the edge of what exists, so that it has a width
-    width: float = 1e-5
     standard_gravity: float = 9.81  # [m/s^2] what readers of a URDF take
-    unlimited: float = (
-        1e9  # [N m, rad/s or m] written where a URDF asks for a limit and none is known
-    )
+    unlimited: float = 1e9  # [N m, rad/s, m] for a limit that a URDF must have, and nobody knows
     compile_seconds: float = 120.0  # [s] until a compiler is given up
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from importlib.util import find_spec
 from xml.etree.ElementTree import Element, SubElement
 
@@ -38,24 +39,19 @@ def mjcf() -> Target:
         import mujoco
 
         polynomials = hasattr(mujoco, "mjNPOLY")
-    carry = _carry if polynomials else _carry_plain
     forward = ("torque_saturation", "drive_lag")
     columns = 4 if polynomials else 2
+    carry = partial(_carry, polynomials=polynomials)
     return Target(carry, _write, _load, "mujoco", columns=columns, forward_only=forward)
 
 
-def _carry_plain(acting: Acting) -> Acting | None:
-    """Return a cause as MJCF has it without polynomials."""
-    if acting.effect.name == "torque_saturation":
-        return acting if acting.values["coefficient"] == 1.0 else None
-    return acting if acting.effect.name in _HELD else None
-
-
-def _carry(acting: Acting) -> Acting | None:
+def _carry(acting: Acting, polynomials: bool) -> Acting | None:
     """Return a cause as MJCF has it: of a spring three powers, without an end to them."""
     name, values = acting.effect.name, acting.values
-    if name != "spring":
-        return acting if name == "quadratic_drag" else _carry_plain(acting)
+    if name == "torque_saturation":
+        return acting if values["coefficient"] == 1.0 else None
+    if name != "spring" or not polynomials:
+        return acting if name in _HELD or (name == "quadratic_drag" and polynomials) else None
     straight = ("stiffness", "rest_angle")
     held = {key: values[key] for key in (*straight, "curvature", "hardening")}
     if not any(x for key, x in values.items() if key not in (*straight, "seen_from", "seen_to")):

@@ -24,9 +24,9 @@ from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.kinematics import Placement
 from pipelines.effects import find_effect
-from pipelines.estimation.consistency import pseudo_inertia
+from pipelines.estimation.links import Links
 from pipelines.export.config import EXPORT
-from pipelines.export.links import Links
+from pipelines.estimation.consistency import pseudo_inertia
 from pipelines.io.robot import RobotDescription
 from pipelines.io.urdf import chain_from_urdf
 
@@ -172,7 +172,13 @@ def _weight(sine: float, cosine: float) -> Acting:
 
 def held_by(target: Target, arm: Arm, links: Links, motion: Motion) -> Held:
     """Return what a target holds of a folded arm; other causes are fitted over a motion."""
-    kept = {acting: target.carry(acting) for acting in (*arm.friction, *arm.effects)}
+    kept = dict[Acting, Acting | None]()
+    for acting in (*arm.friction, *arm.effects):
+        known = {(a.effect.name, a.effect.joint) for a, held in kept.items() if held is not None}
+        twice = (acting.effect.name, acting.effect.joint) in known and target.columns > 0
+        # a joint of URDF or MJCF has one spring and one lag
+        single = acting.effect.name in ("spring", "drive_lag")
+        kept[acting] = None if twice and single else target.carry(acting)
     exact = _chosen(arm, kept.get)
     terms = _terms(exact)
     fits = np.zeros((arm.n_joints, 4))
@@ -184,8 +190,8 @@ def held_by(target: Target, arm: Arm, links: Links, motion: Motion) -> Held:
             for term, (dry, *more) in zip(terms, fits.tolist(), strict=True)
         ]
     causes = [_cause(target, arm, acting, held, motion) for acting, held in kept.items()]
-    chain, names = chain_of(arm.body), _names(arm.robot)
-    joints, before = list[ExportJoint](), _NOWHERE
+    (root, *links_named, tip), joints_named, axes, notes = _names(arm.robot)
+    chain, joints, before = chain_of(arm.body), list[ExportJoint](), _NOWHERE
     for i, described in enumerate(arm.robot.joints):
         turn, at = chain.after[i].rotation, float(chain.offset[i])
         zero = Placement(np.eye(3), np.array([0.0, 0.0, at]))
@@ -197,11 +203,11 @@ def held_by(target: Target, arm: Arm, links: Links, motion: Motion) -> Held:
         limits = described.position, described.velocity, described.torque
         clean = Placement(_clean(origin.rotation), _clean(origin.position))
         inertia = pseudo_inertia(links.phi[i : i + 1])[0]
-        own = names.joints[i], names.links[i], described.revolute
+        own = joints_named[i], links_named[i], described.revolute
         joints.append(ExportJoint(*own, clean, _clean(turn.T[:, 2]), inertia, *limits))
-    tool = before @ Placement(names.tip_rotation, chain.tip)
-    body = identifier(arm.name), names.root, tuple(joints), names.tip, tool, chain.gravity
-    return Held(*body, names.notes, exact, links, tuple(causes), tuple(terms), fits)
+    tool = before @ Placement(axes, chain.tip)
+    body = identifier(arm.name), root, tuple(joints), tip, tool, chain.gravity
+    return Held(*body, notes, exact, links, tuple(causes), tuple(terms), fits)
 
 
 def _chosen(arm: Arm, choose: Callable[[Acting], Acting | None]) -> Arm:
@@ -226,7 +232,7 @@ def _cause(target: Target, arm: Arm, acting: Acting, held: Acting | None, motion
         rest[:, j] -= parts[..., j] @ np.linalg.lstsq(parts[..., j], x, rcond=None)[0]
     explained = float(np.sum(rest**2)) < (1.0 - EXPORT.explained) * float(np.sum(lost**2))
     cost = rms(rest if explained else lost)
-    share = float(cost.max() / rms(whole).max())
+    share = float(cost.max() / max(rms(whole).max(), 1e-300))
     how = "by friction and damping of the joint" if explained else ""
     how = f"in part, {how}".strip(", ") if held is not None else how
     known = explained or held is not None
@@ -276,20 +282,11 @@ def _terms(arm: Arm) -> list[JointTerms]:
     return terms
 
 
-@dataclass(frozen=True)
-class _Names:
-    """Names as they are written, and what was renamed or merged."""
+def _names(robot: RobotDescription) -> tuple[list[str], list[str], Array, tuple[str, ...]]:
+    """Return names of root, links and tip, and of joints, each safe; the axes of the tip; notes.
 
-    root: str
-    joints: list[str]
-    links: list[str]
-    tip: str
-    tip_rotation: Array
-    notes: tuple[str, ...]
-
-
-def _names(robot: RobotDescription) -> _Names:
-    """Return the names of the description, of a URDF those of its links, each safe and once."""
+    Of a URDF they are its own.
+    """
     from xml.etree import ElementTree
 
     root, tip, rotation = "base", "tip", np.eye(3)
@@ -316,7 +313,7 @@ def _names(robot: RobotDescription) -> _Names:
         joints.append(identifier(joint.name, joints))
     pairs = zip([*wanted, *(j.name for j in robot.joints)], [*safe, *joints], strict=True)
     notes += [f"'{old}' is called '{new}'" for old, new in pairs if old != new]
-    return _Names(safe[0], joints, safe[1:-1], safe[-1], rotation, tuple(notes))
+    return safe, joints, rotation, tuple(notes)
 
 
 def identifier(name: str, taken: Sequence[str] = ()) -> str:

@@ -147,15 +147,11 @@ def _load(texts: Mapping[str, str], held: Held, motion: Motion) -> Loaded | None
         rotor = next(float(e.get("value", "nan")) for e in drive.iter(f"{_DRAKE}rotor_inertia"))
         armature[model.joints[model.getJointId(name)].idx_v] = rotor
     model.armature, data, tau = armature, model.createData(), np.zeros(motion.q.shape)
-    states = np.zeros((3, model.nv))
-    for row, (q, v, a) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
-        configuration = pin.neutral(model)
-        for joint, angle in zip(own, q, strict=True):
-            # a joint without limits is a point on a circle
-            point = (np.cos(angle), np.sin(angle)) if joint.nq > 1 else (angle,)
-            configuration[joint.idx_q : joint.idx_q + joint.nq] = point
-        states[1, places], states[2, places] = v, a
-        tau[row] = pin.rnea(model, data, configuration, states[1], states[2])[places]
+    states = np.zeros((len(tau), 3, model.nv))
+    states[:, :, places] = np.stack([motion.q, motion.dq, motion.ddq], axis=1)
+    for row, (q, v, a) in enumerate(states):
+        at = pin.integrate(model, pin.neutral(model), q)  # without limits: a point on a circle
+        tau[row] = pin.rnea(model, data, at, v, a)[places]
     dry = np.asarray(model.upperDryFrictionLimit)[places]
     tau += np.asarray(model.damping)[places] * motion.dq + dry * np.sign(motion.dq)
     return Loaded(f"Pinocchio {pin.__version__}", tau)

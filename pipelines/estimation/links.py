@@ -26,12 +26,13 @@ from pipelines.dynamics.altered import chain_of
 from pipelines.dynamics.body import Array, RigidBody
 from pipelines.dynamics.chain import STANDARD, regressor
 from pipelines.dynamics.kinematics import SerialChain
+from pipelines.estimation.config import LinksConfig
 from pipelines.estimation.consistency import physical_consistency, pseudo_inertia
-from pipelines.export.config import EXPORT
 from pipelines.io.robot import RobotDescription, inconsistency_of_link
 
 __all__ = ["Links", "carried", "consistent_links", "prior_links"]
 
+_CONFIG = LinksConfig()
 _STEPS = 300  # numerics: Newton steps at most; thirty are usual
 _CLOSE, _WAY = 0.3, 0.6  # numerics: size of a step back, and share of the way ahead
 _STUCK = 3e-4  # numerics: of the way; where less of it is left at each step there is no more
@@ -56,7 +57,7 @@ class Links:
     covariance: Array  # (10 joints, 10 joints) of what the logs tell; NaN where nothing is known
     exact: bool  # the base parameters are met; else those of the nearest links that could exist
     distance: float  # [standard deviations] from the base parameters
-    conflicts: tuple[str, ...]  # joints whose links keep the base parameters from being met
+    conflicts: tuple[str, ...]  # joints whose links keep them apart; none within the uncertainty
     origin: tuple[str, ...]  # of each parameter: "logs", "description", "assumed", or "logs and …"
 
     @property
@@ -80,7 +81,7 @@ def prior_links(robot: RobotDescription) -> tuple[Array, tuple[str, ...], tuple[
 
     A link that nothing describes is a ball; of one that could not exist what is possible is kept.
     """
-    ball = np.diag([EXPORT.mass * EXPORT.radius**2 / 5.0] * 3 + [EXPORT.mass])
+    ball = np.diag([_CONFIG.mass * _CONFIG.radius**2 / 5.0] * 3 + [_CONFIG.mass])
     found, assumed, impossible = [], [], []
     for joint in robot.joints:
         link = joint.link
@@ -97,7 +98,7 @@ def prior_links(robot: RobotDescription) -> tuple[Array, tuple[str, ...], tuple[
         if inconsistency_of_link(link):
             impossible.append(joint.name)
         # a point or a rod of mathematics has no width: a thousandth of the ball's is given to it
-        least = 1e-3 * max(float(values.max()), link.mass * EXPORT.radius**2 / 5.0)
+        least = _CONFIG.thin * max(float(values.max()), link.mass * _CONFIG.radius**2 / 5.0)
         about[:3, :3] = axes @ np.diag(np.maximum(values, least)) @ axes.T
         about[:3, 3] = about[3, :3] = 0.0
         found.append(center @ about @ center.T)
@@ -106,7 +107,7 @@ def prior_links(robot: RobotDescription) -> tuple[Array, tuple[str, ...], tuple[
 
 def base_of_standard(body: RigidBody) -> Array:
     """Return B (parameters, 10 joints) with p = B φ, found on random states."""
-    n, rng = body.robot.n_joints, np.random.default_rng(EXPORT.seed)
+    n, rng = body.robot.n_joints, np.random.default_rng(_CONFIG.seed)
     states = [rng.normal(size=(20 * n, n)) for _ in range(3)]
     ours = body.regressor(*states)
     ours = ours.reshape(-1, ours.shape[2])
@@ -129,19 +130,25 @@ def consistent_links(body: RigidBody, p: Array, covariance: Array) -> Links:
     base = base_of_standard(body) @ np.linalg.inv(moved)
     prior = pseudo_inertia((moved @ _standard(prior)).reshape(-1, 10))
     variance = np.diag(covariance)
-    usual = EXPORT.relative * max(float(np.abs(p).max()), 1e-9)
+    usual = _CONFIG.relative * max(float(np.abs(p).max()), 1e-9)
     weighed = np.diag(np.where(variance > 0.0, variance, usual**2))
     if np.isfinite(covariance).all() and (variance > 0.0).all():
         weighed = covariance
+    root = np.linalg.cholesky(np.linalg.pinv(weighed, hermitian=True)).T  # rootᵀ root = C⁻¹
     whiten = 1.0 / np.sqrt(np.diag(weighed))
     a, b = whiten[:, None] * base, whiten * p
-    phi, exact = _closest(a, b, prior, _standard(prior))
+    described = _standard(prior)
+    phi, exact = _closest(a, b, prior)
     nearest = None if exact else physical_consistency(p, weighed, base)
     if nearest is not None:
-        start = nearest.parameters.ravel() + EXPORT.width * _standard(prior)
-        phi, _ = _closest(a, a @ start, prior, start)
-    inverse = _barrier(phi, _pull(prior))[1]
-    # what moves φ with p, all else held: the shortest way in the metric of the divergence
+        # inside of what exists: towards the described links as far as it costs little
+        far = float(np.linalg.norm(a @ described - whiten * nearest.nearest))
+        share = min(_CONFIG.inside * (nearest.distance + 1.0) / far, 0.5)
+        inner = (1.0 - share) * nearest.parameters.ravel() + share * described
+        phi, met = _closest(a, a @ inner, prior)
+        phi = phi if met else inner
+    inverse = _barrier(described, _pull(prior))[1]
+    # how φ moves with p, all else held: the shortest way in the metric at the described links
     onto = inverse @ a.T @ np.linalg.inv(a @ inverse @ a.T)
     spread = carried(covariance, onto * whiten)
     names = [joint.name for joint in body.robot.joints]
@@ -150,7 +157,7 @@ def consistent_links(body: RigidBody, p: Array, covariance: Array) -> Links:
         base,
         spread,
         exact,
-        0.0 if nearest is None else nearest.distance,
+        0.0 if exact else float(np.linalg.norm(root @ (base @ phi - p))),
         () if nearest is None else tuple(names[i] for i in nearest.violating),
         tuple(_origins(base, [name in assumed for name in names])),
     )
@@ -193,14 +200,15 @@ def _origins(base: Array, assumed: list[bool]) -> list[str]:
     return found
 
 
-def _closest(a: Array, b: Array, prior: Array, phi: Array) -> tuple[Array, bool]:
+def _closest(a: Array, b: Array, prior: Array) -> tuple[Array, bool]:
     """Return φ with a φ = b at the least divergence from the described links, and whether there is.
 
     Where there are such φ, there are some on all of the line from the described a φ0 to b. Newton's
     method goes along it: most of the way to where a body ceases to exist, then back to the least
     divergence at that place.
     """
-    described, pull, back, before = _standard(prior), _pull(prior), np.linalg.pinv(a), 0.0
+    phi, pull, back, before = _standard(prior), _pull(prior), np.linalg.pinv(a), 0.0
+    described = phi
     for _ in range(_STEPS):
         gradient, inverse = _barrier(phi, pull)
         across, off = a @ inverse, b - a @ phi
