@@ -24,9 +24,9 @@ from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.kinematics import Placement
 from pipelines.effects import find_effect
+from pipelines.estimation.consistency import pseudo_inertia
 from pipelines.estimation.links import Links
 from pipelines.export.config import EXPORT
-from pipelines.estimation.consistency import pseudo_inertia
 from pipelines.io.robot import RobotDescription
 from pipelines.io.urdf import chain_from_urdf
 
