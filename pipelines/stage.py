@@ -18,6 +18,7 @@ import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
@@ -59,6 +60,7 @@ from pipelines.report.config import REPORT
 from pipelines.report.report import Report
 
 __all__ = [
+    "Answer",
     "Beside",
     "Inputs",
     "Outcome",
@@ -66,14 +68,17 @@ __all__ = [
     "Request",
     "Stage",
     "Uses",
+    "answered",
     "default_out",
     "footer_of",
+    "handed_on",
     "read_logs",
     "refuse_foreign",
     "result_type",
     "run_stage",
     "slug",
     "tilde",
+    "usable_folder",
 ]
 
 S = TypeVar("S")
@@ -208,37 +213,125 @@ def _outcome(
     started: float,
 ) -> Outcome[R]:
     out = request.out or default_out(inputs, stage.name)
+    changed = usable_folder(out, stage, request, inputs, described)
+    answer = answered(stage, request, settings, inputs, described, started)
+    answer = dataclasses.replace(answer, checks=(*_remade(changed), *answer.checks))
+    request.tell("writing the report")
+    object_ = answer.write(out)
+    exit_code = stage.exit_code(answer.result, request.check)
+    return Outcome(answer.result, object_, answer.report, out, exit_code, answer.checks, inputs)
+
+
+def usable_folder(
+    out: Path,
+    stage: Stage[Any, Any],
+    request: Request,
+    inputs: Inputs,
+    described: Iterable[Path] = (),
+) -> Iterable[str]:
+    """Refuse an output folder that a result cannot take; return its files that were changed.
+
+    Raises:
+        UsageError: it holds inputs, or something that is not rrrid's.
+        EnvironmentFault: it cannot be written.
+    """
     refuse_place(out, (*inputs.sources, *described), (*request.paths, *inputs.folders))
-    changed = refuse_foreign(out, request.force, stage.remakes, stage.name)
+    return refuse_foreign(out, request.force, stage.remakes, stage.name)
+
+
+@dataclass(frozen=True, eq=False)
+class Answer(Generic[S, R]):
+    """What a stage found in its inputs: all that was computed, and nothing written."""
+
+    stage: Stage[S, R]
+    request: Request
+    settings: S
+    inputs: Inputs
+    result: R
+    checks: tuple[Check, ...]
+    hashes: dict[Path, str]  # SHA-256 of every source
+    started: float  # [s] since 1970
+
+    @cached_property
+    def report(self) -> Report:
+        """The words, tables and figures of the result."""
+        return renamed(self.stage.report(self.result), short_names(self.request.named))
+
+    def write(self, out: Path) -> dict[str, Any]:
+        """Write everything into a folder that takes the place of `out`; return the JSON object.
+
+        Raises:
+            InputRejected: F14, an input has changed meanwhile.
+            EnvironmentFault: the folder cannot be written.
+        """
+        stage, result = self.stage, self.result
+        object_, series = encode(result)
+        object_ = tilde(headed(stage.name, object_))
+        sources = {str(path): value for path, value in self.hashes.items()}
+        about = _about(stage, self.request, self.settings) | {"inputs": sources}
+        with _new_folder(out) as folder:
+            write_text(folder / "result.json", json_text(object_))
+            if series:
+                write_file(folder / "result.h5", lambda draft: write_series(draft, series))
+            if stage.write is not None:
+                stage.write(result, folder, self.request)
+            if not self.request.no_report:
+                from pipelines.report.render import write_report
+
+                write_report(tilde(self.report), folder, footer_of(stage.name, sources))
+            _refuse_changed(self.hashes)
+            _write_provenance(folder, about, self.started, stage.durations(result))
+        return object_
+
+
+def answered(
+    stage: Stage[S, R],
+    request: Request,
+    settings: S,
+    inputs: Inputs,
+    described: Mapping[Path, str],
+    started: float,
+) -> Answer[S, R]:
+    """Compute what a stage finds in inputs that were read.
+
+    Args:
+        described: SHA-256 of the files that describe the robot.
+        started: [s] since 1970, when the work began.
+
+    Raises:
+        RrridError: what `compute` raises, or under `strict` the first repair.
+    """
     hashes = _hashes(inputs.sources, inputs.hashes) | described
     # equal inputs give equal bytes in any place: no path of this machine goes into a result
     names = short_names(request.named)
     result = renamed(stage.compute(inputs, settings), names)
     of_logs = (check for opened in inputs.logs for check in opened.checks)
-    checks = (*_remade(changed), *inputs.checks, *of_logs, *stage.checks(result))
+    checks = renamed((*inputs.checks, *of_logs, *stage.checks(result)), names)
     for check in checks:
         if request.strict and check.level == "repair":
             raise check.as_error()
-    request.tell("writing the report")
-    report = renamed(stage.report(result), names)
-    object_, series = encode(result)
-    object_ = tilde(headed(stage.name, object_))
-    sources = {str(path): value for path, value in hashes.items()}
-    about = _about(stage, request, settings) | {"inputs": sources}
-    with _new_folder(out) as folder:
-        write_text(folder / "result.json", json_text(object_))
-        if series:
-            write_file(folder / "result.h5", lambda draft: write_series(draft, series))
-        if stage.write is not None:
-            stage.write(result, folder, request)
-        if not request.no_report:
-            from pipelines.report.render import write_report
+    return Answer(stage, request, settings, inputs, result, checks, hashes, started)
 
-            write_report(tilde(report), folder, footer_of(stage.name, sources))
-        _refuse_changed(hashes)
-        _write_provenance(folder, about, started, stage.durations(result))
-    exit_code = stage.exit_code(result, request.check)
-    return Outcome(result, object_, report, out, exit_code, renamed(checks, names), inputs)
+
+def handed_on(
+    before: Answer[Any, Any], stage: Stage[Any, Any], settings: Any, anew: bool = False
+) -> Inputs:
+    """Return what a stage gets of the one before it, as in a run.
+
+    Args:
+        anew: let the stage read what its settings name; only the logs are handed on.
+    """
+    inputs = before.stage.onward(before.result, before.inputs)
+    if anew:
+        return dataclasses.replace(stage.read(before.request, settings), logs=inputs.logs)
+    beside = stage.beside(settings, before.request) if stage.beside else Beside()
+    return dataclasses.replace(
+        inputs,
+        material=inputs.material if stage.uses.before else beside.material,
+        rejected=inputs.rejected if stage.uses.rejected else (),
+        sources=(*inputs.sources, *beside.sources),
+        folders=(*inputs.folders, *beside.folders),
+    )
 
 
 @contextmanager

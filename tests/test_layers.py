@@ -35,15 +35,15 @@ LAYERS = {
     "pipelines.executor": 16,
     "pipelines.batch": 17,
     "pipelines.rerender": 18,
-    "rrrid_cli": 19,
+    "rrrid": 19, "rrrid_cli": 19,
 }
 CALL_STAGES = {"pipelines.run"}
 # Of the effects, all that one of them may import.
 CONTRACT = {f"pipelines.effects{end}" for end in ("", ".base", ".config", ".hooks", ".parameters")}
 FILES = ("pipelines.io", "pipelines.importers")
 DOORS: dict[str, str | tuple[str, ...]] = {
-    "typer": "rrrid_cli", "matplotlib": "pipelines.report", "jinja2": "pipelines.report", "h5py": FILES,
-    "pandas": FILES, "pyarrow": FILES, "filterpy": "benchmarks.textbook_kalman", "mujoco": ("bench", "pipelines.export"),
+    "typer": "rrrid_cli", "matplotlib": ("pipelines.report", "rrrid"), "jinja2": "pipelines.report", "h5py": FILES,
+    "pandas": (*FILES, "rrrid"), "pyarrow": FILES, "filterpy": "benchmarks.textbook_kalman", "mujoco": ("bench", "pipelines.export"),
     "pinocchio": "pipelines.export", "yaml": "nobody", "pickle": "nobody", "pydantic": FILES, "pydantic_core": FILES,
     "tomllib": "pipelines.io.sandbox",
     "rich": "rrrid_cli", "pebble": "pipelines.executor", "dask": "pipelines.executor", "distributed": "pipelines.executor",
@@ -52,7 +52,7 @@ DOORS: dict[str, str | tuple[str, ...]] = {
 NOT_IN = {"scipy": ("pipelines.dynamics", "pipelines.simulation")}  # the equations of the arm stand on NumPy alone
 CIRCLES: set[tuple[str, ...]] = set()
 # What finds its modules by name: stages and effects. Any other import is written out, where the rules can see it.
-BY_NAME = {"pipelines.run", "pipelines.rerender", "pipelines.executor", "pipelines.effects", "rrrid_cli.options"}
+BY_NAME = {"pipelines.run", "pipelines.rerender", "pipelines.executor", "pipelines.effects", "rrrid", "rrrid_cli.options"}
 HEAVY = ("pandas", "matplotlib", "scipy", "filterpy", "pyarrow", "pydantic", "jinja2", "mujoco")
 
 
@@ -61,7 +61,7 @@ def _name(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-MODULES = {_name(path): path for folder in ("pipelines", "rrrid_cli", "bench") for path in sorted((REPO / folder).rglob("*.py"))}
+MODULES = {_name(path): path for folder in ("pipelines", "rrrid", "rrrid_cli", "bench") for path in sorted((REPO / folder).rglob("*.py"))}
 
 
 def _named(call: ast.Call) -> str | None:

@@ -121,11 +121,11 @@ def _usual(
 
 def _torques(rough: Dataset, every: Dictionary, look: Look) -> tuple[Array, Array]:
     """Return the torque (rows,) [N m] of the causes, and of all that was fitted with them."""
-    rows, end, prior = rough.later, look.reported, look.later.prior
-    whole = end.model.torque(rows.data)
-    small = every.later.take(prior.standing).times(end.theta[prior.n_nominal :])
-    cause = whole - replace(end.model, effects=()).torque(rows.data)
-    return cause, whole + in_rows(small, rows.joint) / rows.weight
+    rows, end, model = rough.later, look.selection.end, look.reported.model
+    numbers = end.theta[look.later.prior.n_nominal :]
+    small = every.later.take(look.later.prior.standing).times(numbers)
+    cause = model.torque(rows.data) - replace(model, effects=()).torque(rows.data)
+    return cause, end.model.torque(rows.data) + in_rows(small, rows.joint) / rows.weight
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
     from matplotlib.text import Text
 
-__all__ = ["Picture", "drawn", "render_report", "write_report"]
+__all__ = ["Picture", "drawn", "in_short", "render_report", "write_report"]
 
 Picture = tuple[str, bytes]  # SVG and PNG
 
@@ -99,6 +99,12 @@ def render_report(report: Report, footer: Mapping[str, str]) -> dict[str, bytes]
         footer=[(printable(name), _prose(value)) for name, value in footer.items()],
     )
     return {"report.html": page.encode(), **files}
+
+
+def in_short(report: Report) -> str:
+    """Return the verdict and the key figures as HTML, for a notebook."""
+    table = report.key_figures and _table_words(report.key_figures)
+    return template("notebook.html").render(verdict=_prose(report.verdict), table=table)
 
 
 def _pictures(figures: Mapping[str, Figure]) -> dict[str, Picture]:

@@ -1,0 +1,99 @@
+"""`import rrrid` gives the results of the commands, as objects."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rrrid
+from pipelines import estimate_bps, run
+from pipelines.errors import UsageError
+from pipelines.stage import Request, run_stage
+
+LOGS = Path(__file__).resolve().parents[2] / "sample_logs" / "rrr-closed-form"
+
+
+@pytest.fixture(scope="module")
+def loaded() -> rrrid.Answer:
+    return rrrid.load(LOGS)
+
+
+@pytest.fixture(scope="module")
+def model(loaded: rrrid.Answer) -> rrrid.Answer:
+    return rrrid.estimate(rrrid.reconstruct(loaded))
+
+
+def test_import_loads_no_library_and_no_stage():
+    told = "import sys, rrrid; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True)
+    there = set(done.stdout.split())
+    assert not there & {"numpy", "scipy", "pandas", "h5py", "matplotlib", "pipelines.stage"}
+
+
+def test_chain_of_functions_gives_what_a_run_gives(model: rrrid.Answer, tmp_path: Path):
+    others = ("fit-friction", "validate-writing", "frf", "diagnose", "extend")
+    request = Request((LOGS,), out=tmp_path / "run", no_report=True)
+    whole = run_stage(run.STAGE, request, run.Settings(skip=others, no_cache=True))
+    stored = next(one.result for one in whole.result.stages if one.name == "estimate-bps")
+    assert model.result.relative_error == stored.relative_error
+    for own, its in zip(model.result.parameters, stored.parameters, strict=True):
+        assert (own.name, own.value, own.std) == (its.name, its.value, its.std)
+
+
+def test_stage_alone_gives_what_its_command_gives(loaded: rrrid.Answer, tmp_path: Path):
+    own = rrrid.estimate(loaded)
+    request = Request((LOGS,), out=tmp_path / "out", no_report=True)
+    command = run_stage(estimate_bps.STAGE, request, estimate_bps.Settings())
+    numbers = [one.value for one in own.result.parameters]
+    assert numbers == [one.value for one in command.result.parameters]
+
+
+def test_frame_has_a_row_a_parameter_with_its_std(model: rrrid.Answer):
+    table = model.to_frame()
+    assert list(table["name"]) == [one.name for one in model.result.parameters]
+    assert np.all(table["std"] > 0.0)
+
+
+def test_frame_of_rows_that_are_not_there_names_those_that_are(model: rrrid.Answer):
+    with pytest.raises(UsageError, match="parameters"):
+        model.to_frame("joint_angles")
+
+
+def test_figures_are_drawn_by_name(model: rrrid.Answer):
+    drawing = model.plot(model.figures[-1])
+    assert any(axes.has_data() for axes in drawing.axes)
+    with pytest.raises(UsageError, match=model.figures[0]):
+        model.plot("nothing")
+
+
+def test_notebook_shows_verdict_and_key_figures(model: rrrid.Answer):
+    shown = model._repr_html_()
+    assert "<table>" in shown
+    assert model.summary[:40] in shown
+
+
+def test_saved_folder_is_that_of_the_command(model: rrrid.Answer, tmp_path: Path):
+    folder = model.save(tmp_path / "out")
+    names = {path.name for path in folder.iterdir()}
+    assert {"result.json", "model.json", "report.html", "figures", "provenance.json"} <= names
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("mine")
+    with pytest.raises(rrrid.RrridError):
+        model.save(tmp_path / "mine")
+    assert (tmp_path / "mine" / "notes.txt").read_text() == "mine"
+
+
+def test_saved_model_is_simulated(model: rrrid.Answer, tmp_path: Path):
+    folder = model.save(tmp_path / "out")
+    hold = rrrid.load(LOGS / "hold-1.h5")
+    simulated = rrrid.simulate(hold, folder / "model.json", windowed=True)
+    assert list(simulated.to_frame()["name"]) == ["hold-1"]
+
+
+def test_roles_are_given_where_logs_are_read(loaded: rrrid.Answer):
+    with pytest.raises(UsageError, match="load"):
+        rrrid.diagnose(loaded, reference=("before",))
