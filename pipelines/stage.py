@@ -30,7 +30,6 @@ from pipelines.io.log import ExperimentLog
 from pipelines.io.output import (
     PROVENANCE,
     environment_faults,
-    given_names,
     hash_file,
     refuse_foreign,
     refuse_place,
@@ -159,7 +158,8 @@ def run_stage(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
         SeveralSessions: the logs are of several robots or days; `request.session` names one.
     """
     request = dataclasses.replace(request, paths=expanded(request.paths))
-    given, inputs = given_names(request.paths), ", ".join(map(str, request.paths))
+    given = {str(path.absolute()): str(path) for path in request.paths if not path.is_absolute()}
+    inputs = ", ".join(map(str, request.paths))
     absolute = tuple(path.absolute() for path in request.paths)
     try:
         with environment_faults(request.out or Path()):

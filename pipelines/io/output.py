@@ -15,7 +15,6 @@ import os
 import platform
 import re
 import shutil
-import tempfile
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -123,11 +122,6 @@ def staging_folder(target: Path) -> Path:
     with environment_faults(target):
         folder.mkdir()
     return folder
-
-
-def temporary_folder() -> Path:
-    """Make an empty folder among the system's temporary files; the caller removes it."""
-    return staging_folder(Path(tempfile.gettempdir()) / "rrrid")
 
 
 def remove_folder(folder: Path) -> None:
@@ -346,11 +340,6 @@ def told_apart(paths: Iterable[str]) -> dict[str, str]:
             if ends[end] == 1 or depth >= len(parts[path]):
                 names[path] = str(Path(*end))
     return names
-
-
-def given_names(paths: Iterable[Path]) -> dict[str, str]:
-    """Map every absolute input to the way it was written on the command line."""
-    return {str(path.absolute()): str(path) for path in paths if not path.is_absolute()}
 
 
 def renamed(value: Any, names: Mapping[str, str]) -> Any:

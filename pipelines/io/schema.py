@@ -39,10 +39,6 @@ Feedforward = Literal["friction", "inertia", "coriolis", "gravity"]
 
 EXPERIMENTS: tuple[str, ...] = get_args(Experiment)
 ROLES: tuple[str, ...] = get_args(Role)
-ORIGINS: tuple[str, ...] = get_args(Origin)
-TORQUE_KINDS: tuple[str, ...] = get_args(TorqueKind)
-LAWS: tuple[str, ...] = get_args(Law)
-FEEDFORWARD: tuple[str, ...] = get_args(Feedforward)
 ONE_JOINT = ("friction", "frf")  # experiments that move one joint, and say which
 
 # name -> (quantity, words); the quantity becomes a unit by the joint's type

@@ -12,6 +12,7 @@ import logging
 import math
 import os
 import re
+import tempfile
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -19,7 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from pipelines.errors import clean
-from pipelines.io.output import remove_folder, temporary_folder
+from pipelines.io.output import remove_folder, staging_folder
 
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
@@ -223,7 +224,7 @@ def prepare_matplotlib() -> None:
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     if "MPLCONFIGDIR" in os.environ or _writable_home():
         return
-    folder = temporary_folder()
+    folder = staging_folder(Path(tempfile.gettempdir()) / "rrrid")
     atexit.register(remove_folder, folder)
     os.environ["MPLCONFIGDIR"] = str(folder)
 
