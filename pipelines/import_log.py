@@ -12,6 +12,7 @@ that hour.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -24,11 +25,18 @@ from pipelines.estimation.grids import grid, resample
 from pipelines.importers.assemble import Map, Material, Source, assemble, collect, parse_map
 from pipelines.importers.config import REPAIR
 from pipelines.importers.guess import Draft, guess_recipe
-from pipelines.importers.make_log import ImportedTable, SourceFile, examine, import_table, make_log
+from pipelines.importers.make_log import (
+    ImportedTable,
+    SourceFile,
+    Treatment,
+    examine,
+    import_table,
+    make_log,
+)
 from pipelines.importers.patterns import fill, unique
 from pipelines.importers.recipe import ResampleSpec
 from pipelines.importers.repair import Limits, Recording, late_intervals, repair
-from pipelines.importers.units import Converted, joint_side
+from pipelines.importers.units import joint_side
 from pipelines.io import schema
 from pipelines.io.files import write_log
 from pipelines.io.log import Array, ExperimentLog, Signal
@@ -76,19 +84,6 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Preview:
-    """Every Nth sample of a log, for the report's figure: one short text a column.
-
-    In a result.h5 they would lie among logs of the same ending, and one line a number would make
-    most of result.json.
-    """
-
-    t: str  # [s]
-    q: tuple[str, ...]  # [rad] one a joint
-    tau: tuple[str, ...]  # [N m] one a joint
-
-
-@dataclass(frozen=True)
 class ImportedLog:
     """One log: what it is, where it came from, what was done to it."""
 
@@ -104,7 +99,7 @@ class ImportedLog:
     sources: tuple[SourceFile, ...]
     steps: tuple[str, ...]  # units, signs, transmission
     altered: tuple[str, ...]  # repairs, unwrapping, resampling: what makes it a derived log
-    preview: Preview | None
+    preview: tuple[str, ...]  # every Nth sample of t, q and tau: one short text a column
     log: ExperimentLog = field(metadata=NOT_STORED, repr=False)
 
 
@@ -147,7 +142,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     material: Material = inputs.material
     mapped = parse_map(settings.map, material.recipe, material.robot.n_joints)
     checks: list[Check] = list(material.robot.checks)
-    made: list[Made] = []
+    made: list[tuple[ExperimentLog, tuple[SourceFile, ...], Treatment]] = []
     problems = Gathering()
     for source in material.sources:
         with problems.part():
@@ -156,12 +151,25 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     names = unique(log.name for log, *_ in made)
     paths = unique(slug(name) for name in names)
     logs = []
-    for k, (log, files, steps, altered) in enumerate(made):
-        log, path = replace(log, name=names[k]), f"logs/{paths[k]}.{material.ending}"
-        about = (log.name, path, log.experiment, log.role, log.joint, log.n_samples, log.n_joints)
-        times = (log.sample_time, float(log.t[-1] - log.t[0]))
-        preview = _preview(log) if k < REPAIR.previews else None
-        logs.append(ImportedLog(*about, *times, files, steps, altered, preview, log))
+    for (log, files, done), name, stem in zip(made, names, paths, strict=True):
+        logs.append(
+            ImportedLog(
+                name=name,
+                file=f"logs/{stem}.{material.ending}",
+                experiment=log.experiment,
+                role=log.role,
+                joint=log.joint,
+                samples=log.n_samples,
+                joints=log.n_joints,
+                sample_time=log.sample_time,
+                duration=float(log.t[-1] - log.t[0]),
+                sources=files,
+                steps=tuple(done.steps),
+                altered=tuple(done.altered),
+                preview=_preview(log) if len(logs) < REPAIR.previews else (),
+                log=replace(log, name=name),
+            )
+        )
     tables = []
     for spec, groups, table in material.tables:
         checks += table.checks
@@ -172,19 +180,21 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     return Result(*about_recipe, tuple(logs), tuple(tables), material.ignored, said)
 
 
-# A log, its files, steps of conversion, and what makes it a derived log.
-Made = tuple[ExperimentLog, tuple[SourceFile, ...], tuple[str, ...], tuple[str, ...]]
-
-
 def _import(
     source: Source, material: Material, mapped: Map, settings: Settings, checks: list[Check]
-) -> list[Made]:
-    """Return the logs of one recording: several where its clock was set back."""
+) -> list[tuple[ExperimentLog, tuple[SourceFile, ...], Treatment]]:
+    """Return the logs of one recording, with files and treatment; several where its clock was set
+    back.
+    """
     recipe, trust, missing = material.recipe, settings.trust_units, material.recipe.missing
+    limits = Limits(
+        missing=missing.values,
+        longest_gap=recipe.time.longest_gap,
+        resampled=recipe.resample is not None,
+        missing_rows=missing.rows,
+        held=recipe.log.torque == "held-command",
+    )
     assembled = assemble(source, material, mapped, material.assume_units)
-    held, resampled = recipe.log.torque == "held-command", recipe.resample is not None
-    longest = recipe.time.longest_gap
-    limits = Limits(missing.values, longest, resampled, missing.rows, held)
     checks += assembled.checks
     repaired = []
     for recording in assembled.recordings:
@@ -199,33 +209,33 @@ def _import(
     repairs = [c for c in checks if c.level == "repair" and c.where.startswith(here)]
     made = []
     for k, parts in enumerate(zip(*repaired, strict=True), start=1):
-        sides = [
-            joint_side(part, recipe, assembled.units, material.robot, material.drive, trust)
-            for part in parts
-        ]
-        checks += [check for side in sides for check in side.checks]
-        signals, words = _on_one_clock(parts, sides, recipe.resample, checks)
-        steps = (*assembled.undeclared, *(step for side in sides for step in side.steps))
-        altered = (*(f"{c.code}: {c.message}" for c in repairs),)
-        altered = (*altered, *(step for side in sides for step in side.altered), *words)
+        done = Treatment([*assembled.undeclared], [f"{c.code}: {c.message}" for c in repairs])
+        sides = []
+        for part in parts:
+            side = joint_side(part, recipe, assembled.units, material.robot, material.drive, trust)
+            done.steps += side.steps
+            done.altered += side.altered
+            checks += side.checks
+            sides.append(side.signals)
+        signals = _on_one_clock(parts, sides, recipe.resample, checks, done)
         number = k if len(repaired[0]) > 1 else None
-        done = steps, altered
-        log, files, altered = make_log(source, material, assembled, signals, done, number)
+        log, files = make_log(source, material, assembled, signals, done, number)
         checks += examine(log, source.primary, trust)
-        made.append((log, files, steps, altered))
+        made.append((log, files, done))
     return made
 
 
 def _on_one_clock(
-    parts: tuple[Recording, ...],
-    sides: list[Converted],
+    parts: Sequence[Recording],
+    sides: Sequence[dict[str, Signal]],
     spec: ResampleSpec | None,
     checks: list[Check],
-) -> tuple[dict[str, Signal], tuple[str, ...]]:
+    done: Treatment,
+) -> dict[str, Signal]:
     """Return the signals of a log, its time among them; resampled where the recipe says so."""
     about_t = schema.SIGNALS["t"][1]
     if spec is None:
-        return {"t": Signal(parts[0].t, "s", about_t), **sides[0].signals}, ()
+        return {"t": Signal(parts[0].t, "s", about_t), **sides[0]}
     for part in parts:
         recorded = 1.0 / float(np.median(np.diff(part.t)))
         if recorded * REPAIR.finest < spec.rate:
@@ -235,32 +245,27 @@ def _on_one_clock(
             raise UsageError("C02", message, where=part.where, remedy=remedy)
     begin, end = max(float(p.t[0]) for p in parts), min(float(p.t[-1]) for p in parts)
     at = grid(begin, end, spec.rate)
-    signals, said = {"t": Signal(at, "s", about_t)}, []
+    signals = {"t": Signal(at, "s", about_t)}
     method = "natural cubic spline" if spec.method == "spline" else "straight lines"
     for part, side in zip(parts, sides, strict=True):
-        for name, signal in side.signals.items():
+        for name, signal in side.items():
             values = resample(part.t, signal.values, at, spec.method)
             signals[name] = replace(signal, values=values)
         ms = 1e3 * np.diff(part.t)
         words = f"resampled from {part.t.size} samples {ms.min():.4g} to {ms.max():.4g} ms apart "
-        words += (
-            f"(median {float(np.median(ms)):.4g} ms) to {at.size} at {spec.rate:g} Hz, {method}"
-        )
+        words += f"(median {np.median(ms):.4g} ms) to {at.size} at {spec.rate:g} Hz, {method}"
         if late := late_intervals(part).size:
             words += f"; {many(late, 'interval')} of more than 1.5 times the median bridged"
         remedy = "none needed for fits; record with an even clock where frequencies near the rate"
         checks.append(part.check("T05", words, f"{remedy} matter", "warn"))
-        said.append(words)
-    return signals, tuple(said)
+        done.altered.append(words)
+    return signals
 
 
-def _preview(log: ExperimentLog) -> Preview:
+def _preview(log: ExperimentLog) -> tuple[str, ...]:
     every = max(1, -(-log.n_samples // REPAIR.preview_points))
-
-    def words(values: Array, digits: int = 4) -> str:
-        return " ".join(f"{x:.{digits}g}" for x in values[::every].tolist())
-
-    return Preview(words(log.t, 6), tuple(map(words, log.q.T)), tuple(map(words, log.tau.T)))
+    columns = np.column_stack([log.t, log.q, log.tau])[::every].T
+    return tuple(" ".join(f"{x:.6g}" for x in column) for column in columns.tolist())
 
 
 def write(result: Result, folder: Path, request: Request) -> None:
@@ -273,7 +278,7 @@ def write(result: Result, folder: Path, request: Request) -> None:
 
 
 def report(result: Result) -> Report:
-    """Report what was written, what was done to the samples, and a look at them."""
+    """Report what was written and what was done to the samples."""
     logs, tables, n = result.logs, result.tables, len(result.logs)
     repaired = sum(c.level == "repair" for c in result.checks)
     warned = sum(c.level == "warn" for c in result.checks)
@@ -295,7 +300,7 @@ def report(result: Result) -> Report:
     ]
     drawn = f"Drawn are the first {REPAIR.previews} of {n} logs; rrrid inspect draws more."
     text = (drawn,) if n > REPAIR.previews else ()
-    figures = tuple(_figure(item, item.preview) for item in logs if item.preview)
+    figures = tuple(_figure(item) for item in logs if item.preview)
     sections = [Section("Logs", text, tables=(Table(head, tuple(rows)),), figures=figures)]
     if tables:
         names = ("table", "from", "columns", "rows")
@@ -303,41 +308,32 @@ def report(result: Result) -> Report:
         rows = [(t.name, t.source, x, t.rows) for t, x in zip(tables, units, strict=True)]
         text = ("Files without a clock are no logs; they are kept as tables in SI.",)
         sections.append(Section("Tables", text, (Table(names, tuple(rows)),)))
-    sections.append(_treatment(result))
-    said = repaired or warned
-    return Report("Import", words, "attention" if said else "good", sections=tuple(sections))
-
-
-def _treatment(result: Result) -> Section:
-    """Return the treatment of the samples, and all warnings."""
-    done = []
-    for item in result.logs:
+    rows = []
+    for item in logs:
         steps = "; ".join((*item.steps, *item.altered)) or "taken as they are"
-        done.append((item.name, ", ".join(s.name for s in item.sources), steps))
-    tables = [Table(("log", "from", "done to the samples"), tuple(done))]
+        rows.append((item.name, ", ".join(s.name for s in item.sources), steps))
+    treated = [Table(("log", "from", "done to the samples"), tuple(rows))]
     said = [c for c in result.checks if c.level != "ok"]
     if found := tuple((c.code, c.level, c.where, c.message, c.remedy) for c in said):
-        tables.append(Table(("code", "level", "where", "what", "remedy"), found))
-    text = [f"By recipe {result.recipe}."]
-    if names := ", ".join(result.ignored[:8]):
-        more = " …" if result.ignored[8:] else ""
-        files = many(len(result.ignored), "file")
-        text.append(f"The recipe does not speak of {files}: {names}{more}.")
-    return Section("What was done to the data", tuple(text), tuple(tables))
+        treated.append(Table(("code", "level", "where", "what", "remedy"), found))
+    by = [f"By recipe {result.recipe}."]
+    if listed := ", ".join(result.ignored[:8]):
+        more, files = " …" if result.ignored[8:] else "", many(len(result.ignored), "file")
+        by.append(f"The recipe does not speak of {files}: {listed}{more}.")
+    sections.append(Section("What was done to the data", tuple(by), tuple(treated)))
+    said_any = repaired or warned
+    return Report("Import", words, "attention" if said_any else "good", sections=tuple(sections))
 
 
-def _figure(item: ImportedLog, preview: Preview) -> Figure:
-    def numbers(texts: tuple[str, ...]) -> Array:
-        return np.array([text.split() for text in texts], dtype=np.float64).T
-
+def _figure(item: ImportedLog) -> Figure:
     def draw(figure: Any) -> None:
         from pipelines.report.figures import draw_joint_signals, joint_axes
 
-        t = numbers((preview.t,))[:, 0]
-        signals = (("q", preview.q, "rad"), ("tau", preview.tau, "N m"))
-        for part, (name, texts, unit) in zip(figure.subfigures(1, 2), signals, strict=True):
-            axes = joint_axes(part, item.joints)
-            draw_joint_signals(axes, t, numbers(texts), unit, quantity=name)
+        t, *columns = (np.array(text.split(), dtype=np.float64) for text in item.preview)
+        halves = (("q", "rad", columns[: item.joints]), ("tau", "N m", columns[item.joints :]))
+        for part, (name, unit, half) in zip(figure.subfigures(1, 2), halves, strict=True):
+            axes, values = joint_axes(part, item.joints), np.column_stack(half)
+            draw_joint_signals(axes, t, values, unit, quantity=name)
 
     title = f"{item.name}: position and torque of each joint as they are in the log."
     described = f"position and torque of log {item.name} against time"

@@ -147,8 +147,6 @@ class Notes:
     longest: int = 300  # characters of a line that is read
     slowest: float = 1.0  # [Hz] what robots are recorded at
     fastest: float = 1e5  # [Hz]
-    same_rate: float = 0.02
-    same_number: float = 1e-3
     fewest_words: int = 3  # of a sentence, beside the joint's
     most_sentences: int = 3  # about single joints that a draft quotes
 
@@ -176,7 +174,6 @@ class Evidence:
     windows: int = 200  # of a recording
     fewest_turns: int = 3  # reversals
     one_turn: float = 5e-3  # range of one recorded revolution over the resolution, less 1
-    widest_rad: float = 400.0  # [rad] range of a motor in a recording
     share: float = 0.02  # of a bound: what keeps 0..1 and comes near both is a share of a range
     share_above: float = 0.3  # of the range, below which it begins
     share_below: float = 0.7  # of the range of both signs, below which it begins
@@ -184,7 +181,6 @@ class Evidence:
     whole_span: float = 10.0  # whole numbers over more are counts or degrees
     all_whole: float = 0.99  # of numbers
     limit_slack: float = 0.05  # of a joint's range
-    most_degrees: float = 720.0  # two turns
     one_turn_rad: float = 6.440264939859077  # [rad] 2.05 pi: a turn and a little
     twice_room: float = 2.0  # no joint moves over so many times its range
     even: float = 0.05  # of a step: the 95th percentile of an even clock

@@ -9,7 +9,7 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from pipelines.errors import Check, InputRejected, UsageError, clean, did_you_me
 from pipelines.importers.assemble import Assembled, Material, Source
 from pipelines.importers.patterns import fill
 from pipelines.importers.raw import RawTable
-from pipelines.importers.recipe import LogSpec, Recipe, TableSpec
+from pipelines.importers.recipe import ControllerSpec, LogSpec, TableSpec
 from pipelines.io import schema
 from pipelines.io.limits import FEWEST, recorded_span, shorter_than_period
 from pipelines.io.log import (
@@ -57,18 +57,28 @@ class SourceFile:
     columns: tuple[str, ...]
 
 
+@dataclass
+class Treatment:
+    """What was done to the samples of a log, in words; what `altered` them makes it a derived one.
+
+    Not frozen: every step of an import adds its own.
+    """
+
+    steps: list[str]  # units, signs, transmission
+    altered: list[str]  # repairs, unwrapping, resampling
+
+
 def make_log(
     source: Source,
     material: Material,
     assembled: Assembled,
     signals: Mapping[str, Signal],
-    done: tuple[tuple[str, ...], tuple[str, ...]],
+    done: Treatment,
     number: int | None,
-) -> tuple[ExperimentLog, tuple[SourceFile, ...], tuple[str, ...]]:
-    """Return one log of converted signals with its time, its files, and what altered it in words.
+) -> tuple[ExperimentLog, tuple[SourceFile, ...]]:
+    """Return one log of converted signals with its time, and its files.
 
     Args:
-        done: steps of conversion, and alterations that make a log a derived one.
         number: of a log that had to be split.
 
     Raises:
@@ -77,15 +87,19 @@ def make_log(
         UsageError: C02, name, experiment, role or joint cannot be read from the recipe and the
             file's name.
     """
-    recipe, robot, (steps, altered) = material.recipe, material.robot, done
-    about, t = _about(recipe.log, source, recipe.where), signals["t"].values
+    recipe, robot, t = material.recipe, material.robot, signals["t"].values
+    about, time = _about(recipe.log, source, recipe.where), recipe.time
     name = clean(fill(about.name, source.groups, recipe.where), 200) or "log"
     used = [column for columns in assembled.columns.values() for column in columns]
     files = tuple(
         SourceFile(file, table.sha256, tuple(c for c in used if c in table.columns))
         for file, table in source.tables.items()
     )
-    step = _sample_time(recipe, t)
+    step = time.sample_time or 1.0 / (time.rate or 1.0)
+    if recipe.resample:
+        step = 1.0 / recipe.resample.rate
+    elif time.column is not None:
+        step = float(np.median(np.diff(t)))
     if t.size < FEWEST:
         message = f"{t.size} samples at {1 / step:g} Hz; a log needs {FEWEST}"
         remedy = "record longer, or resample faster"
@@ -96,7 +110,8 @@ def make_log(
             remedy = "record a whole period, or correct period"
             raise InputRejected("T07", short, where=source.primary, remedy=remedy)
         # A part of a log that had to be split need not hold a period; it is a log without one.
-        about, altered = replace(about, period=None), (*altered, f"period left out: {short}")
+        about = replace(about, period=None)
+        done.altered.append(f"period left out: {short}")
     if about.experiment == "frf" and "v" not in signals:
         message = "an frf log without its excitation v"
         raise InputRejected("S01", message, where=source.primary, remedy="map signals.v")
@@ -114,71 +129,49 @@ def make_log(
         joint=about.joint,
         period=about.period,
         posture=None if about.posture is None else np.array(about.posture),
-        controller=_controller(material),
-        derived=_derived(files, material, steps, altered, about.recorded) if altered else None,
+        controller=_controller(recipe.controller),
+        derived=_derived(files, material, done, about.recorded) if done.altered else None,
     )
-    return log, files, altered
-
-
-def _sample_time(recipe: Recipe, t: Array) -> float:
-    if recipe.resample:
-        return 1.0 / recipe.resample.rate
-    if recipe.time.column is not None:
-        return float(np.median(np.diff(t)))
-    return recipe.time.sample_time or 1.0 / (recipe.time.rate or 1.0)
+    return log, files
 
 
 def _about(base: LogSpec, source: Source, where: str) -> LogSpec:
     """Return [log], overruled by groups of the file's name, these by its [[file]] case."""
-    groups = source.groups
-    found: dict[str, Any] = {}
+    groups, problem = source.groups, ""
+    found: dict[str, Any] = {k: groups[k] for k in ("experiment", "role", "joint") if k in groups}
     for key, known in (("experiment", schema.EXPERIMENTS), ("role", schema.ROLES)):
-        if groups.get(key, known[0]) not in known:
-            message = f"'{source.primary}' gives {key} '{groups[key]}', must be one of "
+        if found.get(key, known[0]) not in known:
+            problem = f"gives {key} '{found[key]}', must be one of {', '.join(known)}"
             remedy = f"rename the file, or write {key} = … in a [[file]] case before it"
-            raise UsageError("C02", message + ", ".join(known), where=where, remedy=remedy)
-        found |= {key: groups[key]} if key in groups else {}
-    if "joint" in groups:
-        if not groups["joint"].isdigit():
-            message = f"'{source.primary}' gives joint '{groups['joint']}', must be a number"
-            remedy = "rename the file, or take digits alone: {joint:[0-9]+}"
-            raise UsageError("C02", message, where=where, remedy=remedy)
+    if not groups.get("joint", "1").isdigit():
+        problem = f"gives joint '{groups['joint']}', must be a number"
+        remedy = "rename the file, or take digits alone: {joint:[0-9]+}"
+    elif "joint" in groups:
         found["joint"] = int(groups["joint"])
     for key in ("name", "experiment", "role", "joint", "period", "recorded", "posture"):
         value = getattr(source.case, key, None)
         found |= {} if value is None else {key: value}
     about = replace(base, **found)
     if about.experiment not in schema.ONE_JOINT:
-        return replace(about, joint=None)
-    if about.joint is None:
-        message = f"{about.experiment} log '{source.primary}' without its joint"
+        about = replace(about, joint=None)
+    elif about.joint is None:
+        problem = f"makes a {about.experiment} log without its joint"
         remedy = "write joint = … in its [[file]], or {joint} in the pattern"
-        raise UsageError("C02", message, where=where, remedy=remedy)
+    if problem:
+        raise UsageError("C02", f"'{source.primary}' {problem}", where=where, remedy=remedy)
     return about
 
 
-def _controller(material: Material) -> Controller | None:
-    spec = material.recipe.controller
+def _controller(spec: ControllerSpec | None) -> Controller | None:
     if spec is None:
         return None
-    keys = ("kp", "kd", "ki", "output_limit", "torque_resolution")
-    given = {key: getattr(spec, key) for key in keys}
-    arrays: dict[str, Any] = {k: np.array(x) for k, x in given.items() if x is not None}
-    return Controller(
-        law=spec.law,
-        feedforward=spec.feedforward,
-        velocity=spec.velocity,
-        delay=spec.delay,
-        **arrays,
-    )
+    numbers = ("kp", "kd", "ki", "output_limit", "torque_resolution")
+    given: dict[str, Any] = {k: x for k, x in asdict(spec).items() if x is not None}
+    return Controller(**given | {key: np.array(given[key]) for key in numbers if key in given})
 
 
 def _derived(
-    files: tuple[SourceFile, ...],
-    material: Material,
-    steps: tuple[str, ...],
-    altered: tuple[str, ...],
-    recorded: str | None,
+    files: tuple[SourceFile, ...], material: Material, done: Treatment, recorded: str | None
 ) -> Derived:
     # `created` is the time of the recording where the recipe gives it. Where it does not, no honest
     # time is left: the clock on the wall and the times of files differ from one import to the next,
@@ -186,7 +179,7 @@ def _derived(
     # 1970-01-01T00:00:00Z: to be read as "not known". provenance.json has the hour.
     hashes = {file.name: file.sha256 for file in files}
     record = {"recipe": material.recipe_path.name, "files": hashes}
-    record |= {"converted": list(steps), "altered": list(altered)}
+    record |= {"converted": done.steps, "altered": done.altered}
     sha256 = files[0].sha256
     if len(files) > 1:
         sha256 = hashlib.sha256("\n".join(file.sha256 for file in files).encode()).hexdigest()

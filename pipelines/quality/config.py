@@ -16,7 +16,6 @@ class QualityConfig:
     unit_fits: float = (
         0.02  # relative difference of the steps of t from a sample time in their unit
     )
-    lost_stamps: float = 0.01  # of the samples without a time, above which the clock is no clock
     stale_share: float = 0.05  # of the samples that repeat the one before: fewer do no harm
     stale_together: float = 0.95  # of one channel's repeats that are repeats of all channels
     even: float = 0.5  # sample times by which an interval may differ where no sample is missing
