@@ -132,14 +132,15 @@ def flatten(
     """
     items: list[tuple[str, Any]] = []
     if isinstance(document, Mapping):
-        own = _own_name(document)
+        texts = {str(key).lower(): x for key, x in document.items() if isinstance(x, str)}
+        name = (texts.get("name") or texts.get("label") or "")[: ARRAYS.longest_text]
+        own = name + unit_in(texts) if name else ""
         series = [key for key, value in document.items() if own and _is_series(value)]
-        signals = [key for key in series if read_name(key).quantity != "time"]
+        alone = [key for key in series if read_name(key).quantity != "time"]
         for key, value in document.items():
-            if series and str(key).lower() in _SAID:
-                continue
-            stem = own.partition(" [")[0] if key in series else path
-            items.append((own if signals == [key] else f"{stem}.{key}".lstrip("."), value))
+            if not series or str(key).lower() not in _SAID:
+                stem = name if key in series else path
+                items.append((own if alone == [key] else f"{stem}.{key}".lstrip("."), value))
     elif isinstance(document, list) and document and all(isinstance(x, Mapping) for x in document):
         items = [(f"{path}[{k}]", item) for k, item in enumerate(document)]
     else:
@@ -148,17 +149,9 @@ def flatten(
         yield from flatten(value, inner, depth - 1)
 
 
-def _own_name(record: Mapping[str, Any]) -> str:
-    """Return "hip_angle [rad]" of a record that names its samples and their unit; "" otherwise."""
-    texts = {str(key).lower(): value for key, value in record.items() if isinstance(value, str)}
-    name = texts.get("name") or texts.get("label") or ""
-    return name[: ARRAYS.longest_text] + unit_in(texts) if name else ""
-
-
 def unit_in(record: Mapping[str, Any]) -> str:
     """Return " [rad]" of a record, or of an array's attributes, with an entry for the unit."""
-    units = (v for key, v in record.items() if key.lower() in _SAID[2:])
-    unit = next(units, "")
+    unit = next((v for key, v in record.items() if key.lower() in _SAID[2:]), "")
     return f" [{unit}]" if isinstance(unit, str) and 0 < len(unit) <= ARRAYS.longest_unit else ""
 
 
@@ -183,9 +176,8 @@ def columns_of_arrays(arrays: Mapping[str, Anything], source: str) -> RawTable:
     usable = {k: array for k, array in arrays.items() if k not in text and array.size > 1}
     samples = _samples_of(usable, source)
     checks: list[Check] = []
-    columns: dict[str, Array] = {}
+    columns, units = dict[str, Array](), dict[str, str]()
     groups: dict[str, tuple[str, ...]] = {}
-    units: dict[str, str] = {}
     others: list[str] = []
     for name, array in usable.items():
         matrix = array[:, None] if array.ndim == 1 else array
@@ -200,12 +192,12 @@ def columns_of_arrays(arrays: Mapping[str, Anything], source: str) -> RawTable:
         if matrix.shape[1] > ARRAYS.widest:
             continue
         if rows not in (samples, 1):
-            stored = f"'{name}' is stored as {(rows, wide)}, read as {matrix.shape}"
-            message, remedy = f"{stored}: time along the long side", "store one row a sample"
-            checks.append(Check.of("S11", "warn", message, where=source, remedy=remedy))
+            message = f"'{name}' is stored as {(rows, wide)}, read as {matrix.shape}: time along "
+            words, remedy = f"{message}the long side", "store one row a sample"
+            checks.append(Check.of("S11", "warn", words, where=source, remedy=remedy))
         short, unit = split_unit(name)
         several = tuple(f"{short}_{j + 1}" for j in range(matrix.shape[1]))
-        groups[short] = names = several if len(several) > 1 else (short,)
+        groups[short] = names = several if several[1:] else (short,)
         units |= dict.fromkeys(names, unit) if unit else {}
         columns |= zip(names, np.ascontiguousarray(matrix.T, dtype=np.float64), strict=True)
     if others:
@@ -240,18 +232,20 @@ def _samples_of(arrays: Mapping[str, Anything], source: str) -> int:
         shared.update({n for n, other in sides if n > 1 and other <= ARRAYS.widest})
     enough = {n: count for n, count in shared.items() if n >= FEWEST} or dict(shared)
     samples = max(enough, key=lambda n: (enough[n], n), default=0)
-    alike = [name for name, array in arrays.items() if array.shape == (samples, samples)]
-    if len(alike) != enough.get(samples):
-        alike = [
+    matrices = {k: x.shape for k, x in arrays.items() if x.ndim > 1 and 1 not in x.shape}
+    open_ = [name for name, shape in matrices.items() if shape == (samples, samples)]
+    if len(open_) != enough.get(samples):
+        ratio = ARRAYS.clearly_longer
+        open_ = [
             name
-            for name, array in arrays.items()
-            if samples in array.shape
-            and _either_way(array)
-            and enough.get(sum(array.shape) - samples) == enough[samples]
+            for name, (rows, wide) in matrices.items()
+            if samples in (rows, wide)
+            # Neither side is clearly longer, and as many arrays have the other one:
+            and not (rows >= ratio * wide or wide >= ratio * rows or (rows > wide < ratio))
+            and enough.get(rows + wide - samples) == enough[samples]
         ]
-    if alike:
-        shape = f"'{alike[0]}' has shape {arrays[alike[0]].shape}"
-        message = f"{shape}: which side is time is not known"
+    if open_:
+        message = f"'{open_[0]}' has shape {matrices[open_[0]]}: which side is time is not known"
         remedy = "store one row a sample, with many more samples than columns"
         raise InputRejected("S11", message, where=source, remedy=remedy)
     return samples
@@ -269,15 +263,6 @@ def _not_real(array: Anything) -> str:
         if rounding > max(1.0, ARRAYS.rounded * float(np.median(np.abs(np.diff(values))))):
             return f"{array.dtype} beyond 2^53, which a real number of 64 bit cannot hold exactly"
     return f"an array of {array.ndim} dimensions" if array.shape[2:] or not array.shape else ""
-
-
-def _either_way(array: Anything) -> bool:
-    """Return whether neither side of a matrix is clearly longer."""
-    if array.ndim == 1 or 1 in array.shape:
-        return False
-    rows, wide = array.shape
-    long = ARRAYS.clearly_longer
-    return not (rows >= long * wide or (rows > wide and wide < long) or wide >= long * rows)
 
 
 def unstacked(table: RawTable) -> RawTable:
@@ -301,12 +286,8 @@ def unstacked(table: RawTable) -> RawTable:
         # A date comes again and the stamps rise from it again. Runs of one experiment do so too,
         # but their clock starts from zero or goes on.
         falls = np.flatnonzero(np.diff(stamps) < 0) + 1
-        if (
-            falls.size
-            and (stamps[falls] == stamps[0]).all()
-            and stamps[0] > np.ptp(stamps)
-            and read_name(name).quantity == "time"
-        ):
+        again = falls.size and (stamps[falls] == stamps[0]).all() and stamps[0] > np.ptp(stamps)
+        if again and read_name(name).quantity == "time":
             message = f"the same times come {falls.size + 1} times: series below each other"
             where = f"{table.source}, column '{name}', {table.place(int(falls[0]))}"
             remedy = "put them side by side, one row a sample: pivot in pandas or in the data base"

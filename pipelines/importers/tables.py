@@ -16,7 +16,7 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -40,10 +40,6 @@ from pipelines.io.log import Array
 from pipelines.io.output import fault_of
 from pipelines.io.sandbox import Answer, guarded, regular_file
 
-_ENDINGS = {
-    "npy": (".npy",), "npz": (".npz",), "parquet": (".parquet",), "json": (".json", ".jsonl"),
-    "text": (), "mat5": (".mat",), "mat73": (".mat", ".h5", ".hdf5"),
-}  # fmt: skip
 _REFUSED = (
     (b"PK\x03\x04", "X12", "an archive (zip or xlsx)", "unpack it, or export the sheet as CSV"),
     (b"\x1f\x8b", "X12", "a gzip archive", "unpack it"),
@@ -56,12 +52,56 @@ _REFUSED = (
     (b"TDSm", "F06", "a TDMS file of LabVIEW", "export it as CSV, or save it as MAT"),
     (b"ARROW1", "F06", "an Arrow (Feather) file", "save it as Parquet"),
 )  # fmt: skip
-_KINDS = (
-    (b"\x93NUMPY", "npy"), (b"PAR1", "parquet"), (b"\x89HDF\r\n\x1a\n", "mat73"),
-    (b"MATLAB 7.3", "mat73"), (b"MATLAB 5.0", "mat5"),
-)  # fmt: skip
 _PICKLES = (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|nan|[+-]?inf", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Reader:
+    """How files of one kind are known and read: a new kind is a module and an entry in `READERS`.
+
+    `read(data, path, source)` returns named arrays or nested documents of them, the samples among
+    them, with units in brackets behind names and metadata as texts and single numbers; or a table.
+    """
+
+    kind: str
+    magic: tuple[bytes, ...]  # first bytes, any of them
+    endings: tuple[str, ...]
+    read: Callable[[bytes, Path, str], Mapping[str, Any] | RawTable]
+    library: Callable[[], object] | None = None  # imports it; it is then used in a child process
+
+
+def _scipy() -> object:
+    import scipy.io
+
+    return scipy.io
+
+
+def _h5py() -> object:
+    import h5py
+
+    return h5py
+
+
+def _pyarrow() -> object:
+    import pyarrow.compute
+    import pyarrow.parquet
+
+    return pyarrow.parquet
+
+
+READERS = (
+    Reader("npy", (b"\x93NUMPY",), (".npy",), lambda data, _, source: npy.read_npy(data, source)),
+    Reader("npz", (), (".npz",), lambda data, _, source: npy.read_npz(data, source), lambda: None),
+    Reader("parquet", (b"PAR1",), (".parquet",),
+           lambda data, _, source: npy.read_parquet(data, source), _pyarrow),
+    Reader("mat73", (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"), (".mat", ".h5", ".hdf5"),
+           lambda _, path, source: matlab.read_hdf5(path, source), _h5py),
+    Reader("mat5", (b"MATLAB 5.0",), (".mat",),
+           lambda data, _, source: matlab.read_mat5(data, source), _scipy),
+    Reader("json", (), (".json", ".jsonl"), lambda data, _, source: read_json(data, source)),
+    Reader("text", (), (), lambda data, _, source: read_text(data, source)),
+)  # fmt: skip
 
 
 def read_table(path: Path, text: TextFormat | None = None, name: str = "") -> RawTable:
@@ -71,6 +111,40 @@ def read_table(path: Path, text: TextFormat | None = None, name: str = "") -> Ra
         InputRejected: the file is damaged, hostile or holds no table; the code says which.
         EnvironmentFault: no permission.
     """
+    data, source = _bytes_of(path), name or path.name
+    reader = _reader_of(data, source)
+    if reader.kind == "text":
+        detect = text in (None, TextFormat()) and len(data) <= ARRAYS.largest_json
+        table = (read_yaml(data, source) if detect else None) or read_text(data, source, text)
+    elif reader.library is not None:
+        reader.library()  # before the fork, so that every child has it
+        table = _in_child(lambda: _table(reader.read(data, path, source), source), path, source)
+    else:
+        table = _table(reader.read(data, path, source), source)
+    longest = max((*table.columns, *table.text, ""), key=len)
+    if len(longest) > ARRAYS.longest_name:
+        message = f"the name of a column has {len(longest)} characters, {longest[:40]} …"
+        remedy = "export the table with a header of short names"
+        raise InputRejected("F16", message, where=source, remedy=remedy)
+    table = unstacked(table)
+    checks, ending = table.checks, path.suffix.lower()
+    foreign = reader.kind != "text" or any(ending in other.endings for other in READERS)
+    if ending not in reader.endings and foreign:
+        message = f"named '{path.suffix}', but its content is {reader.kind}; read as that"
+        checks = (Check.of("F06", "warn", message, where=source, remedy="rename it"), *checks)
+    return replace(table, checks=checks, sha256=hashlib.sha256(data).hexdigest())
+
+
+def _table(content: Mapping[str, Any] | RawTable, source: str) -> RawTable:
+    return content if isinstance(content, RawTable) else table_of_document(content, source)
+
+
+def _bytes_of(path: Path) -> bytes:
+    """Return the whole file.
+
+    Raises:
+        InputRejected: X05, larger than a recording. EnvironmentFault: F15, a logger holds it.
+    """
     status = regular_file(path)
     if status.st_size > ARRAYS.largest_file:
         message = f"{status.st_size} bytes; import reads files up to {ARRAYS.largest_file}"
@@ -78,45 +152,27 @@ def read_table(path: Path, text: TextFormat | None = None, name: str = "") -> Ra
     try:
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         with os.fdopen(handle, "rb") as file:
-            _refuse_locked(handle, path)
+            try:
+                fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except BlockingIOError:
+                message, remedy = "in use by another process", "wait until the recording is done"
+                raise EnvironmentFault("F15", message, where=path, remedy=remedy) from None
+            except OSError:
+                pass  # a file system without locks cannot say
             data = file.read(status.st_size + 1)  # as much is allocated as is asked for
             if len(data) > status.st_size:  # it has grown meanwhile
                 data += file.read(ARRAYS.largest_file + 1 - len(data))
     except OSError as problem:
         raise fault_of(problem, path) from None
-    source = name or path.name
-    kind = _kind(data, source)
-    table = _read(kind, data, path, source, text)
-    longest = max((*table.columns, *table.text, ""), key=len)
-    if len(longest) > ARRAYS.longest_name:
-        message = f"the name of a column has {len(longest)} characters, {longest[:40]} …"
-        remedy = "export the table with a header of short names"
-        raise InputRejected("F16", message, where=source, remedy=remedy)
-    table = unstacked(table)
-    checks = table.checks
-    ending = path.suffix.lower()
-    foreign = any(ending in endings for endings in _ENDINGS.values()) or kind != "text"
-    if ending not in _ENDINGS[kind] and foreign:
-        message = f"named '{path.suffix}', but its content is {kind}; read as that"
-        checks = (Check.of("F06", "warn", message, where=source, remedy="rename it"), *checks)
-    return replace(table, checks=checks, sha256=hashlib.sha256(data).hexdigest())
+    return data
 
 
-def _refuse_locked(handle: int, path: Path) -> None:
-    """F15: a file that a logger holds is still being written."""
-    try:
-        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        message, remedy = "in use by another process", "wait until the recording is finished"
-        raise EnvironmentFault("F15", message, where=path, remedy=remedy) from None
-    except OSError:
-        return  # a file system without locks cannot say
-
-
-def _kind(data: bytes, source: str) -> str:
-    """F06: return the kind of a file by its first bytes."""
-    if data.startswith(b"PK\x03\x04") and source.lower().endswith(".npz"):
-        return "npz"
+def _reader_of(data: bytes, source: str) -> Reader:
+    """F06: return the reader of a file by its first bytes."""
+    kinds = {reader.kind: reader for reader in READERS}
+    name = source.lower()
+    if data.startswith(b"PK\x03\x04") and name.endswith(".npz"):
+        return kinds["npz"]
     for magic, code, what, remedy in _REFUSED:
         if data.startswith(magic):
             kind = UsageError if code == "X12" else InputRejected
@@ -124,46 +180,14 @@ def _kind(data: bytes, source: str) -> str:
     if data.startswith(_PICKLES):
         message, remedy = "a pickle, which is never opened", "save plain numbers as NPY or CSV"
         raise InputRejected("X07", message, where=source, remedy=remedy)
-    for magic, name in _KINDS:
-        if data.startswith(magic):
-            return name
-    if source.lower().endswith(".mat") and len(data) > ARRAYS.mat4_header and b"\0" in data[:4]:
-        return "mat5"  # version 4
-    return "json" if is_json(data) else "text"
-
-
-def _read(kind: str, data: bytes, path: Path, source: str, text: TextFormat | None) -> RawTable:
-    if kind == "text":
-        detect = text in (None, TextFormat()) and len(data) <= ARRAYS.largest_json
-        yaml = read_yaml(data, source) if detect else None
-        return yaml or read_text(data, source, text)
-    if kind == "json":
-        return read_json(data, source)
-    if kind == "npy":
-        return columns_of_arrays(npy.read_npy(data, source), source)
-    # Libraries are imported before the fork, so that every child has them.
-    if kind == "npz":
-        return _in_child(
-            lambda: columns_of_arrays(npy.read_npz(data, source), source), path, source
-        )
-    if kind == "parquet":
-        import pyarrow.compute
-        import pyarrow.parquet  # noqa: F401
-
-        return _in_child(
-            lambda: columns_of_arrays(npy.read_parquet(data, source), source), path, source
-        )
-    if kind == "mat5":
-        import scipy.io  # noqa: F401
-
-        return _in_child(
-            lambda: table_of_document(matlab.read_mat5(data, source), source), path, source
-        )
-    import h5py  # noqa: F401
-
-    return _in_child(
-        lambda: columns_of_arrays(matlab.read_hdf5(path, source), source), path, source
-    )
+    for reader in READERS:
+        if reader.magic and data.startswith(reader.magic):
+            return reader
+    if name.endswith(".mat") and len(data) > ARRAYS.mat4_header and b"\0" in data[:4]:
+        return kinds["mat5"]  # version 4
+    # JSON begins a list of lists or objects, or an object.
+    head = data[:256].lstrip(b"\xef\xbb\xbf \t\r\n").translate(None, b" \r\n")
+    return kinds["json" if head.startswith((b'{"', b"[{", b"[[", b"{}", b"[]")) else "text"]
 
 
 def _in_child(read: Callable[[], RawTable], path: Path, source: str) -> RawTable:
@@ -201,12 +225,6 @@ def _in_child(read: Callable[[], RawTable], path: Path, source: str) -> RawTable
         raise
     except (KeyError, TypeError, AttributeError, StopIteration):  # of a child that a file broke
         raise matlab.damaged_mat(source) from None
-
-
-def is_json(data: bytes) -> bool:
-    """Return whether the file begins as JSON does: a list of lists or objects, or an object."""
-    head = data[:256].lstrip(b"\xef\xbb\xbf \t\r\n").translate(None, b" \r\n")
-    return head.startswith((b'{"', b"[{", b"[[", b"{}", b"[]"))
 
 
 def read_json(data: bytes, source: str) -> RawTable:
@@ -298,7 +316,7 @@ def table_of_document(document: Any, source: str) -> RawTable:
 def _array(value: Any) -> Anything | None:
     """Return an array of numbers or of texts; None of anything else."""
     if isinstance(value, np.ndarray):
-        return value if value.dtype.kind in "fiubcUO" else None
+        return value if value.dtype.kind in "fiubcUOS" else None
     if isinstance(value, str | int | float):
         return np.array(value) if not isinstance(value, int) or abs(value) < 2**63 else None
     if not isinstance(value, list):

@@ -41,6 +41,7 @@ from pipelines.io.units import UNITS, canonical_unit
 
 # Encodings of a file without a mark; the first where none fits better.
 _ENCODINGS = ("latin-1", "cp932", "gb18030", "cp949", "cp1250", "cp1251")
+_MARKS = (codecs.BOM_UTF8, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 # A cell such as "#REF!" at the start of a line is damage, not a comment.
 _SHEET_ERROR = re.compile(r"\s*#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)\b")
 _GROUPED = re.compile(r"[-+.\d\seEnaNif]*[\[(][-+.\d\seEnaNif()\[\]]*")  # "12 (0.1 0.2) (3 4)"
@@ -128,25 +129,22 @@ def _decode(data: bytes, source: str, encoding: str | None) -> tuple[str, list[C
     if encoding is None:
         encoding = _encoding_of(data)
         if encoding != "utf-8":
-            marks = (codecs.BOM_UTF8, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-            message = f"read as {encoding}{' (byte order mark)' if data.startswith(marks) else ''}"
+            mark = " (byte order mark)" if data.startswith(_MARKS) else ""
             remedy = "give encoding under [format] if that is wrong"
+            message = f"read as {encoding}{mark}"
             checks.append(Check.of("F16", "warn", message, where=source, remedy=remedy))
-    if not encoding.lower().replace("_", "-").startswith("utf-16"):
-        whole = len(data)
-        data = data.rstrip(b"\0")
+    if encoding.lower().replace("_", "-").startswith("utf-16"):
+        data = data[: len(data) // 2 * 2]
+    else:
+        whole, data = len(data), data.rstrip(b"\0")
         if len(data) < whole:
-            message = f"{whole - len(data)} NUL bytes at the end left out: the recorder lost its"
-            remedy = "let the recorder close its file"
-            checks.append(
-                Check.of("F09", "repair", f"{message} power", where=source, remedy=remedy)
-            )
+            message = f"{whole - len(data)} NUL bytes at the end left out: the recorder lost its "
+            remedy, message = "let the recorder close its file", f"{message}power"
+            checks.append(Check.of("F09", "repair", message, where=source, remedy=remedy))
         if (at := data.find(b"\0")) >= 0:
             message = f"a NUL byte in line {data[:at].count(10) + 1}"
             remedy = "the file is damaged or not text; export it again"
             raise InputRejected("F16", message, where=source, remedy=remedy)
-    elif len(data) % 2:
-        data = data[:-1]
     try:
         text = data.decode(encoding)
     except (UnicodeDecodeError, LookupError) as problem:
@@ -156,10 +154,8 @@ def _decode(data: bytes, source: str, encoding: str | None) -> tuple[str, list[C
 
 
 def _encoding_of(data: bytes) -> str:
-    if data.startswith(codecs.BOM_UTF8):
-        return "utf-8-sig"
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return "utf-16"
+    if data.startswith(_MARKS):
+        return "utf-8-sig" if data.startswith(codecs.BOM_UTF8) else "utf-16"
     head = data[: TEXT.head_bytes]
     for high, low, encoding in ((1, 0, "utf-16-le"), (0, 1, "utf-16-be")):
         nul = head[high::2].count(0)
@@ -169,7 +165,8 @@ def _encoding_of(data: bytes) -> str:
         data.decode("utf-8")
     except UnicodeDecodeError:  # by how many words that name columns it has
         words = {e: words_of(head.decode(e, "ignore")) for e in _ENCODINGS}
-        return max(_ENCODINGS, key=lambda e: sum(word in vocabulary().every for word in words[e]))
+        known = vocabulary().every
+        return max(_ENCODINGS, key=lambda e: sum(word in known for word in words[e]))
     return "utf-8"
 
 
@@ -365,13 +362,22 @@ def _refuse_formula(cell: str, column: str, line: int, source: str) -> None:
 
 def _words(table: RawTable, name: str, cells: list[str], example: str) -> RawTable:
     """Return a table of one column alone, of times of the day, durations, arrays or text."""
-    lists, example = _lists(cells), example[: TEXT.longest_example]
+    if (seconds := _clock_times(cells)) is not None:
+        return replace(table, columns={name: seconds}, units={name: "s"})
+    # Numbers with one known unit behind them, as MATLAB writes a duration: "0.004 sec".
+    found = [m for cell in cells if (m := WITH_UNIT.fullmatch(cell)) is not None]
+    units = {canonical_unit(m[2]) for m in found}
+    if len(found) == len(cells) and len(units) == 1 and units <= UNITS.keys():
+        numbers = np.array([float(m[1]) for m in found])
+        return replace(table, columns={name: numbers}, units={name: units.pop()})
+    # Arrays, as Python and numpy write them.
+    arrays = all(cell[:1] + cell[-1:] in ("[]", "()") for cell in cells)
+    lists = [re.split(r"[\s,;]+", cell[1:-1].strip(" ,")) for cell in cells] if arrays else []
     lengths = sorted({len(row) for row in lists})
-    if (read := _clock_times(cells) or _with_units(cells)) is not None:
-        return replace(table, columns={name: read[0]}, units={name: read[1]})
     if len(lengths) == 1 and all(is_number(number) for row in lists for number in row):
-        arrays = enumerate(np.array(lists, dtype=np.float64).T)
-        return replace(table, columns={f"{name}[{k}]": values for k, values in arrays})
+        items = enumerate(np.array(lists, dtype=np.float64).T)
+        return replace(table, columns={f"{name}[{k}]": values for k, values in items})
+    example = example[: TEXT.longest_example]
     if len(lengths) > 1:  # as of two publishers
         example = f"arrays of {lengths[0]} to {lengths[-1]} items: keep the rows of one kind"
     # After how many samples it repeats: after one, or after the joints of an arm.
@@ -382,22 +388,7 @@ def _words(table: RawTable, name: str, cells: list[str], example: str) -> RawTab
     return replace(table, text={name: example}, labels=labels, cycles=cycles)
 
 
-def _with_units(cells: list[str]) -> tuple[Array, str] | None:
-    """Return numbers with one known unit behind them, as MATLAB writes a duration: "0.004 sec"."""
-    found = [m for cell in cells if (m := WITH_UNIT.fullmatch(cell)) is not None]
-    units = {canonical_unit(m[2]) for m in found}
-    if len(found) < len(cells) or len(units) != 1 or not units <= UNITS.keys():
-        return None
-    return np.array([float(m[1]) for m in found]), units.pop()
-
-
-def _lists(cells: list[str]) -> list[list[str]]:
-    """Return the items of arrays in cells, as Python and numpy write them; none without arrays."""
-    arrays = all(cell[:1] + cell[-1:] in ("[]", "()") for cell in cells)
-    return [re.split(r"[\s,;]+", cell[1:-1].strip(" ,")) for cell in cells] if arrays else []
-
-
-def _clock_times(cells: list[str]) -> tuple[Array, str] | None:
+def _clock_times(cells: list[str]) -> Array | None:
     """Return seconds [s] of times such as "2024-05-17T11:30:00.125Z" or "1:30 PM", over midnight.
 
     Hours that stay below 13 and start again after noon are of a clock of 12 hours.
@@ -411,7 +402,7 @@ def _clock_times(cells: list[str]) -> tuple[Array, str] | None:
     seconds = np.array(minutes) + 3600.0 * hours
     day = 86400.0 if halves or (hours > TEXT.half_day).any() else 43200.0
     again = np.diff(seconds) < -0.5 * day
-    return seconds + day * np.concatenate([[0.0], np.cumsum(again)]), "s"
+    return np.asarray(seconds + day * np.concatenate([[0.0], np.cumsum(again)]))
 
 
 def _without_repeats(columns: Mapping[str, Array], header: Header, source: str) -> dict[str, Array]:
