@@ -56,18 +56,14 @@ def draft_recipe(path: Path, robot: str | None = None) -> Draft:
     Raises:
         InputRejected: the file cannot be read as a table of numbers.
     """
+
+    def link_torque(robot: RobotDescription, q: Array, dq: Array, ddq: Array) -> Array | None:
+        body = rigid_body(robot)
+        p = body.known_parameters()
+        return None if p is None else body.torque(q, dq, ddq, p)
+
     regular_file(path, what="one recording, such as a CSV file")
-    return guess_recipe(path, robot, _link_torque)
-
-
-def _link_torque(robot: RobotDescription, q: Array, dq: Array, ddq: Array) -> Array | None:
-    """Return the torques (samples, joints) [N m] of a robot's links at q, dq, ddq [rad].
-
-    None where a link is unknown.
-    """
-    body = rigid_body(robot)
-    p = body.known_parameters()
-    return None if p is None else body.torque(q, dq, ddq, p)
+    return guess_recipe(path, robot, link_torque)
 
 
 @dataclass(frozen=True)
@@ -150,7 +146,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     problems.raise_all()
     names = unique(log.name for log, *_ in made)
     paths = unique(slug(name) for name in names)
-    logs = []
+    logs: list[ImportedLog] = []
     for (log, files, done), name, stem in zip(made, names, paths, strict=True):
         logs.append(
             ImportedLog(

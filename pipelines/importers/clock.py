@@ -142,15 +142,6 @@ def _summed(table: RawTable, parts: Sequence[tuple[str, str | None]], where: str
     return total
 
 
-def _contradict(header: str, declared: str) -> bool:
-    """Return whether two units of time differ; a header without any of them says nothing."""
-    header, declared = canonical_unit(header), canonical_unit(declared)
-    known = quantity_of(header) == "time"
-    if declared in _INDEX:
-        return known
-    return known and declared in UNITS and UNITS[header] != UNITS[declared]
-
-
 def _plausible(median: float) -> dict[str, float]:
     """Return the units in which a median step gives a rate that robots are recorded at [Hz]."""
     rates = {unit: 1.0 / (median * SECONDS[unit]) for unit in _COMMON}
@@ -173,7 +164,9 @@ def _unit_of_stamps(
 ) -> tuple[str, list[Check]]:
     """S08: return the unit of time stamps: the recipe's, the header's, or the only possible one."""
     if declared:
-        if header and _contradict(header, declared):
+        known, said = canonical_unit(header or ""), canonical_unit(declared)
+        other = said in _INDEX or (said in UNITS and UNITS.get(known) != UNITS[said])
+        if header and quantity_of(known) == "time" and other:
             message = f"the header says '{header}', the recipe says '{declared}'"
             remedy = "correct one of them: the unit in [time], or the header"
             raise InputRejected("S08", message, where=where, remedy=remedy)

@@ -18,7 +18,7 @@ import numpy as np
 
 from pipelines.errors import clean
 from pipelines.importers.clock import median_step, round_rate
-from pipelines.importers.columns import Group, listed_joints, own_units
+from pipelines.importers.columns import Group, own_units
 from pipelines.importers.config import CHOICE, EVIDENCE, NOTES
 from pipelines.importers.evidence import Guess, held
 from pipelines.importers.hypotheses import NAMED, Findings, Model, infer, named_units, statement
@@ -210,10 +210,7 @@ class _Drafting:
         columns, units = _columns(choice.group.columns, table), _units(self.found.q_units)
         lines = [f"q = {{ {columns}, unit = {units}{self.found.q_keys} }}"]
         lines += [f"    {self.note('q unit', guess)}" for guess in self.found.q_guesses]
-        lines += self._about(choice, table)
-        if still := [str(j + 1) for j in np.flatnonzero(np.ptp(q, axis=0) == 0.0)]:
-            lines.append(f"    # joint {', '.join(still)} never moves in this file")
-        return lines
+        return [*lines, *self._about(choice, table)]
 
     def _about(self, choice: Choice, table: RawTable) -> list[str]:
         """Return comments: a stated unit, the order of the joints, the other candidates."""
@@ -226,9 +223,7 @@ class _Drafting:
             lines.append(f"    # check: {contrary}the file states {clean(said.words, 200)}")
         if gripper := ", ".join(clean(column, 40) for column in group.gripper):
             lines.append(f"    # left out, a gripper's by the file's names: {gripper}")
-        if group.order == "robot":
-            lines.append("    # in the order of the robot's joints, by their names")
-        elif group.order == "file" and len(group.columns) > 1:
+        if group.order == "file" and len(group.columns) > 1:
             lines.append("    # check: joints in the order of the file, from the base to the tip")
         for other in [other for other in choice.others[:6] if not other.partial]:
             words = f"{other.words} ({other.quantity}, {other.origin})"
@@ -288,13 +283,9 @@ class _Drafting:
         lines += [f"    # {doubt}"] if doubt else []
         if found and all(group.origin == "commanded" for group in found):
             lines.append("    # named commands, or the points of a plan: what was measured?")
-        named = listed_joints(table, ()) if found and found[0].order == "text" else ()
-        texts = ", ".join(clean(text, 40) for text in named)
-        order = f"these are {texts}" if texts else "in the order of the file"
-        lines += self._files_of_axes() if found else []
         for group in found[:8]:
             first = group is choice.group and not doubt
-            ask = f"{order}; write them from the base to the tip" if first else "candidate"
+            ask = "write them from the base to the tip" if first else "candidate"
             lines.append(f"    # {ask}: {_columns(group.columns, table)}{self._file(table)}")
         if found and (beside := [f"file = {_quoted(name)}" for name in self.reading.beside[:8]]):
             return [*lines, f"    # as many columns and rows: {', '.join(beside)}"]

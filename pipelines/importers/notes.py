@@ -58,6 +58,7 @@ _NOT_SAMPLED = re.compile(
     r"|duration|start|offset|length|fourier|\bfor\b|baud|regel|frequency of|trajectory|camera"
     r"|buffer|update|inner|current loop"
 )
+_STEP = frozenset({"dt", "ts", "step", "interval", "period"})
 _SI = re.compile(
     r"\bsi[ -](?:base )?(?:units?|einheiten|unites?)\b"
     r"|\b(?:units?|einheiten|unites?|unidades|unita)\W+(?:\w+ )?si\b"
@@ -206,26 +207,20 @@ def stated_rate(notes: Sequence[str]) -> Statement | None:
         if not _SAMPLED.search(text) or _NOT_SAMPLED.search(text):
             continue
         named = _UNIT_OF_NAME.search(text)
-        for number, unit in _QUANTITY.findall(text):
-            rate = _rate_of(_number(number), unit or (named[1] if named else ""), text)
+        for digits, behind in _QUANTITY.findall(text):
+            number, unit = _number(digits), behind or (named[1] if named else "")
+            known, rate = UNITS.get(canonical_unit(unit)), 0.0
+            if unit in ("hz", "fps", "sps", "khz"):
+                rate = number * (1e3 if unit == "khz" else 1.0)
+            elif known is not None and known.quantity == "time" and number > 0.0:
+                rate = 1.0 / (number * known.factor)
+            elif not unit and _STEP & set(re.findall(r"[a-z]+", text)):
+                rate = 1.0 / number if 0.0 < number < 1.0 else 0.0  # [s], as programs write it
+            elif not unit and re.search(r"rate|fps|\bf_?s\b|freq", text):
+                rate = number
             if NOTES.slowest <= rate <= NOTES.fastest:
                 found.setdefault(rate, clause)
     return _only(found, 0.02, "g")
-
-
-def _rate_of(number: float, unit: str, text: str) -> float:
-    """Return the rate [Hz] of a number with its unit, 0 for anything else."""
-    if number <= 0.0:
-        return 0.0
-    if unit in ("hz", "fps", "sps", "khz"):
-        return number * (1e3 if unit == "khz" else 1.0)
-    if unit:
-        known = UNITS.get(canonical_unit(unit))
-        time = known is not None and known.quantity == "time"
-        return 1.0 / (number * known.factor) if known and time else 0.0
-    if {"dt", "ts", "step", "interval", "period"} & set(re.findall(r"[a-z]+", text)):
-        return 1.0 / number if number < 1.0 else 0.0  # [s], as programs write it
-    return number if re.search(r"rate|fps|\bf_?s\b|freq", text) and number >= 1.0 else 0.0
 
 
 def stated_of_some_joints(notes: Sequence[str], n: int) -> list[str]:

@@ -384,8 +384,12 @@ def _parts_and_plans(groups: list[Group], path: Path, clock: Sequence[str]) -> l
 
 def _derivatives(table: RawTable, groups: list[Group], clock: Clock | None) -> list[Group]:
     """Name by evidence: the slope of a position is its velocity, that of it an acceleration."""
+
+    def by_name(group: Group) -> float:
+        return -_score(group, len(group.columns), SCORES.command)
+
     known = [g for g in groups if g.quantity in ("position", "")]
-    known = sorted((g for g in known if len(g.columns) <= CHOICE.most_joints), key=_score_of_name)
+    known = sorted((g for g in known if len(g.columns) <= CHOICE.most_joints), key=by_name)
     values = {g: matrix(table, g.columns) for g in known[: CHOICE.most_blocks]}
     t = clock.values if clock else None
     source: dict[Group, Group] = {}  # derivative -> what it is the slope of
@@ -401,10 +405,6 @@ def _derivatives(table: RawTable, groups: list[Group], clock: Clock | None) -> l
             g = replace(g, quantity=kind, origin=origin)
         named.append(g)
     return named
-
-
-def _score_of_name(group: Group) -> float:
-    return -_score(group, len(group.columns), SCORES.command)
 
 
 def _undisputed(table: RawTable, q: Choice) -> Choice:

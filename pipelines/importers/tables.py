@@ -398,30 +398,25 @@ def read_yaml(data: bytes, source: str) -> RawTable | None:
     first = re.match(rb"(---\r?\n)?[A-Za-z_]\w*:( \S.*)?\r?\n", data[:300])
     if first is None or data.count(b"\n---") <= 1:
         return None
-    text = data.decode("utf-8", "replace").replace("\r\n", "\n")
-    parts = re.split(r"(?m)^---[^\S\n]*$", text)
-    return _table_of_frames([_yaml(part) for part in parts if part.strip()], source)
-
-
-def _yaml(text: str) -> dict[str, Any]:
-    root: dict[str, Any] = {}
-    path: list[tuple[int, dict[str, Any]]] = [(-1, root)]
-    holder, name = root, ""  # of the last key
-    for line in text.split("\n"):
-        found = re.fullmatch(r"( *)(?:(- )\s*(.*)|([\w/.]+):(?: (.*))?)", line)
-        if found is None:
-            continue
-        value = ((found[3] if found[2] else found[5]) or "").strip()
-        scalar = float(value) if _NUMBER.fullmatch(value) else value.strip("'\"")
-        if found[2]:
-            if not isinstance(holder.get(name), list):
-                holder[name] = []
-            holder[name].append(scalar)
-            continue
-        while path[-1][0] >= len(found[1]):
-            path.pop()
-        holder, name = path[-1][1], found[4]
-        holder[name] = scalar if value else {}
-        if not value:
-            path.append((len(found[1]), holder[name]))
-    return root
+    frames: list[dict[str, Any]] = []
+    for part in re.split(r"(?m)^---\s*$", data.decode("utf-8", "replace")):
+        frames.append({})
+        path, holder, name = [(-1, frames[-1])], frames[-1], ""  # of the last key
+        for line in part.splitlines():
+            found = re.fullmatch(r"( *)(?:(- )\s*(.*)|([\w/.]+):(?: (.*))?)", line)
+            if found is None:
+                continue
+            value = ((found[3] if found[2] else found[5]) or "").strip()
+            scalar = float(value) if _NUMBER.fullmatch(value) else value.strip("'\"")
+            if found[2]:
+                if not isinstance(holder.get(name), list):
+                    holder[name] = []
+                holder[name].append(scalar)
+                continue
+            while path[-1][0] >= len(found[1]):
+                path.pop()
+            holder, name = path[-1][1], found[4]
+            holder[name] = scalar if value else {}
+            if not value:
+                path.append((len(found[1]), holder[name]))
+    return _table_of_frames([frame for frame in frames if frame], source)

@@ -183,9 +183,8 @@ def joint_side(
         InputRejected: S05 unit of another quantity, S07 degrees declared as radians, S10 current
             without constant.
     """
-    done = Converted()
-    problems = Gathering()
-    n, where = robot.n_joints, recipe.where
+    done, problems = Converted(), Gathering()
+    n, where, controller = robot.n_joints, recipe.where, recipe.controller
     for name, raw in part.signals.items():
         with problems.part():
             spec, each = recipe.signals[name], units[name]
@@ -194,26 +193,32 @@ def joint_side(
             factor *= _per_joint(spec.sign, n, f"signals.{name}.sign", where)
             values = _unwrapped(part, name, raw, spec, each, done) * factor
             values = _in_si(part, name, values, recipe, each, drive, done)
-            if _motor_side(name, recipe):
-                values = _through_drive(name, values, drive, where, done)
-            elif schema.SIGNALS[name][0] in (*MOTION, "torque"):
-                _refuse_wrong_kind(part, name, each, robot)
+            if schema.SIGNALS[name][0] in (*MOTION, "torque"):
+                motor = recipe.drive.transmission is not None
+                if (spec.side or ("motor" if motor else "joint")) == "motor":
+                    values = _through_drive(name, values, drive, where, done)
+                else:
+                    _refuse_wrong_kind(part, name, each, robot)
             if offset.any():
                 done.steps.append(f"{name}: offset {', '.join(f'{x:.6g}' for x in offset)} added")
-            law = recipe.controller.law if recipe.controller else None
-            unit, words = schema.unit_of(name, law), schema.SIGNALS[name][1]
-            done.signals[name] = Signal(values + offset, unit, words)
+            unit = schema.unit_of(name, controller.law if controller else None)
+            done.signals[name] = Signal(values + offset, unit, schema.SIGNALS[name][1])
     problems.raise_all()
     if not trust_units and "q" in done.signals:
         _refuse_degrees(part, done.signals["q"].values, units["q"], robot)
     in_degrees = "q" in part.signals and set(units["q"]) <= {"deg", "°"}
-    if turns := quarter_turns(part.signals["q"]) if in_degrees else {}:
-        starts = f"the numbers start at {', '.join(map(str, turns.values()))} times pi/2"
+    if in_degrees and (starts := _starts(part.signals["q"])):
         message = f"declared in degrees, but {starts}, digit by digit: radians of the motor side?"
         remedy = 'if so, declare unit = "rad" and add [drive] transmission = the gear ratios'
         at = f"{part.where}, signal q"
         done.checks.append(Check.of("S07", "warn", message, where=at, remedy=remedy))
     return done
+
+
+def _starts(q: Array) -> str:
+    """Return at which quarter turns positions start, in words; "" where they do not."""
+    turns = quarter_turns(q)
+    return f"it starts at {', '.join(map(str, turns.values()))} times pi/2" if turns else ""
 
 
 def _unwrapped(
@@ -317,12 +322,6 @@ def _excitation(name: str, recipe: Recipe, units: tuple[str, ...], where: str) -
     raise InputRejected("S05", message, where=where, remedy=remedy)
 
 
-def _motor_side(name: str, recipe: Recipe) -> bool:
-    motor = recipe.drive.transmission is not None
-    side = recipe.signals[name].side or ("motor" if motor else "joint")
-    return schema.SIGNALS[name][0] in (*MOTION, "torque") and side == "motor"
-
-
 def _through_drive(
     name: str, values: Array, drive: Drive | None, where: str, done: Converted
 ) -> Array:
@@ -374,9 +373,8 @@ def _refuse_degrees(
         angle = np.deg2rad(q[:, j])
         degrees = bool(angle.min() >= low - slack and angle.max() <= high + slack)
         if joint.revolute and span > 4.0 * math.pi and (degrees or too_far):
-            turns = quarter_turns(q)
-            starts = f"it starts at {', '.join(map(str, turns.values()))} times pi/2"
-            motor = f"; {starts}, as motors of such gear ratios do at rest" if turns else ""
+            starts = _starts(q)
+            motor = f"; {starts}, as motors of such gear ratios do at rest" if starts else ""
             message += f"looks like {'degrees or ' if degrees else ''}the motor side{motor}"
             remedy = degrees_or_motor(span, (low, high))
             raise InputRejected("S07", message, where=where, remedy=remedy)

@@ -69,7 +69,10 @@ def time_base(log: ExperimentLog) -> TimeBase:
         ticks = interval * scale / (nominal if unit and not is_rate else typical)
     same = np.flatnonzero(interval == 0.0)
     # in a clock that stands still throughout no sample is a repetition
-    twice = np.array([forward.size > 0 and _repeats(log, k) for k in same.tolist()], dtype=np.bool_)
+    twice = np.full(same.size, forward.size > 0)
+    for values in (signal.values for signal in log.signals.values()):
+        alike = [np.array_equal(values[k], values[k + 1], equal_nan=True) for k in same]
+        twice &= np.array(alike, dtype=np.bool_)
     gaps = np.flatnonzero(ticks > GAP_TICKS)
     rms, worst = limits.jitter(ticks)
     late = limits.late(ticks, rms)
@@ -107,11 +110,6 @@ def _time_unit(forward: Array, nominal: float) -> tuple[str, float, bool]:
     if not fits or np.ptp([units[unit] for unit in fits]) > CONFIG.unit_fits * scale:
         return "", 1.0, False
     return fits[0], units[fits[0]], False
-
-
-def _repeats(log: ExperimentLog, k: int) -> bool:
-    pairs = (signal.values[k : k + 2] for signal in log.signals.values())
-    return all(np.array_equal(pair[0], pair[1], equal_nan=True) for pair in pairs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +155,11 @@ def usable(log: ExperimentLog) -> Usable:
     signals = {}
     for name, signal in log.signals.items():
         values = signal.values[kept]
-        values = values * time.scale if name == "t" else np.where(_missing(values), np.nan, values)
+        if name == "t":
+            values = values * time.scale
+        else:  # what is infinite, absurdly large or a filler is no measurement
+            with np.errstate(invalid="ignore"):
+                values = np.where((np.abs(values) < ABSURD) & ~sentinels(values), values, np.nan)
         signals[name] = Signal(values, "s" if name == "t" else signal.units, signal.long_name)
     gone = np.isnan(signals["q"].values) | np.isnan(signals["tau"].values)
     wrapped, jumped = _unwrapped(replace(log, signals=signals))
@@ -181,12 +183,6 @@ def usable(log: ExperimentLog) -> Usable:
         stop=stop,
         time=time,
     )
-
-
-def _missing(x: Array) -> Mask:
-    """Return where there is no measurement: not a number, infinite, absurdly large, or a filler."""
-    with np.errstate(invalid="ignore"):
-        return ~(np.abs(x) < ABSURD) | sentinels(x)
 
 
 def _runs(
@@ -416,47 +412,36 @@ def _jumps(q: Array) -> tuple[Mask, Array]:
 
 
 def _emergency_stop(log: ExperimentLog) -> tuple[int, str] | None:
-    """Return the sample from which the arm no longer follows, up to the end of the log, and how."""
+    """Return the sample from which the arm no longer follows, up to the end of the log, and how.
+
+    A joint leaves its reference and stays away, or all torques drop to zero for good while the arm
+    moves. In a friction log that is a coast-down, and meant.
+    """
     if log.experiment in ("hold", "frf") or log.n_samples < SHORTEST:
         return None
-    shortest = max(20, round(CONFIG.stop_least / log.sample_time))
-    events = [event for event in (_lost_reference(log), _power_cut(log, shortest)) if event]
+    shortest, events = max(20, round(CONFIG.stop_least / log.sample_time)), []
+    if "q_ref" in log:
+        error = np.abs(log.q - log["q_ref"])
+        measured = np.isfinite(error)
+        spread = np.std(np.where(np.isfinite(log["q_ref"]), log["q_ref"], 0.0), axis=0)
+        usual = np.median(np.where(measured, error, 0.0), axis=0)
+        lost = (error > np.maximum(np.maximum(0.05, 0.25 * spread), 8.0 * usual)) | ~measured
+        starts = _start_of_last_run(lost & measured.any(axis=0))
+        joint, start = int(starts.argmin()), int(starts.min())
+        if measured[start:, joint].sum() > (log.n_samples - start) / 2:
+            off = float(np.nanmax(error[start:, joint]))
+            words = f"joint {joint + 1} leaves its reference by {off:.3g} rad and stays away"
+            events.append((start, words))
+    if log.experiment != "friction":
+        start = int(_start_of_last_run((log.tau == 0.0).all(axis=1)[:, None])[0])
+        speed = np.abs(lagged_speed(log.q, log.sample_time))
+        speed = np.where(np.isfinite(speed), speed, 0.0)
+        usual = np.quantile(speed, 0.75, axis=0)
+        before = speed[max(0, start - shortest) : start].max(axis=0, initial=0.0)
+        if ((before > 0.3 * usual) & (usual > 0)).any():
+            events.append((start, "all torques drop to zero while the arm moves"))
     late = [e for e in events if 0.1 * log.n_samples < e[0] < log.n_samples - shortest]
     return min(late, default=None)
-
-
-def _lost_reference(log: ExperimentLog) -> tuple[int, str] | None:
-    if "q_ref" not in log:
-        return None
-    error = np.abs(log.q - log["q_ref"])
-    measured = np.isfinite(error)
-    spread = np.std(np.where(np.isfinite(log["q_ref"]), log["q_ref"], 0.0), axis=0)
-    usual = np.median(np.where(measured, error, 0.0), axis=0)
-    lost = (error > np.maximum(np.maximum(0.05, 0.25 * spread), 8.0 * usual)) | ~measured
-    starts = _start_of_last_run(lost & measured.any(axis=0))
-    joint = int(starts.argmin())
-    start = int(starts[joint])
-    recorded = measured[start:, joint]
-    if recorded.sum() <= recorded.size / 2:
-        return None
-    off = float(np.nanmax(error[start:, joint]))
-    return start, f"joint {joint + 1} leaves its reference by {off:.3g} rad and stays away"
-
-
-def _power_cut(log: ExperimentLog, shortest: int) -> tuple[int, str] | None:
-    """Return where all torques drop to zero for good while the arm moves.
-
-    In a friction log that is a coast-down, and meant.
-    """
-    if log.experiment == "friction":
-        return None
-    start = int(_start_of_last_run((log.tau == 0.0).all(axis=1)[:, None])[0])
-    speed = np.abs(lagged_speed(log.q, log.sample_time))
-    speed = np.where(np.isfinite(speed), speed, 0.0)
-    usual = np.quantile(speed, 0.75, axis=0)
-    before = speed[max(0, start - shortest) : start].max(axis=0, initial=0.0)
-    moving = ((before > 0.3 * usual) & (usual > 0)).any()
-    return (start, "all torques drop to zero while the arm moves") if moving else None
 
 
 def _start_of_last_run(mask: Mask) -> Indices:
