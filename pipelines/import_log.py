@@ -25,18 +25,11 @@ from pipelines.estimation.grids import grid, resample
 from pipelines.importers.assemble import Map, Material, Source, assemble, collect, parse_map
 from pipelines.importers.config import REPAIR
 from pipelines.importers.guess import Draft, guess_recipe
-from pipelines.importers.make_log import (
-    ImportedTable,
-    SourceFile,
-    Treatment,
-    examine,
-    import_table,
-    make_log,
-)
+from pipelines.importers.make_log import ImportedTable, SourceFile, examine, import_table, make_log
 from pipelines.importers.patterns import fill, unique
 from pipelines.importers.recipe import ResampleSpec
 from pipelines.importers.repair import Limits, Recording, late_intervals, repair
-from pipelines.importers.units import joint_side
+from pipelines.importers.units import Converted, joint_side
 from pipelines.io import schema
 from pipelines.io.files import write_log
 from pipelines.io.log import Array, ExperimentLog, Signal
@@ -138,7 +131,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     material: Material = inputs.material
     mapped = parse_map(settings.map, material.recipe, material.robot.n_joints)
     checks: list[Check] = list(material.robot.checks)
-    made: list[tuple[ExperimentLog, tuple[SourceFile, ...], Treatment]] = []
+    made: list[tuple[ExperimentLog, tuple[SourceFile, ...], Converted]] = []
     problems = Gathering()
     for source in material.sources:
         with problems.part():
@@ -178,7 +171,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
 
 def _import(
     source: Source, material: Material, mapped: Map, settings: Settings, checks: list[Check]
-) -> list[tuple[ExperimentLog, tuple[SourceFile, ...], Treatment]]:
+) -> list[tuple[ExperimentLog, tuple[SourceFile, ...], Converted]]:
     """Return the logs of one recording, with files and treatment; several where its clock was set
     back.
     """
@@ -205,17 +198,17 @@ def _import(
     repairs = [c for c in checks if c.level == "repair" and c.where.startswith(here)]
     made = []
     for k, parts in enumerate(zip(*repaired, strict=True), start=1):
-        done = Treatment([*assembled.undeclared], [f"{c.code}: {c.message}" for c in repairs])
+        done = Converted([*assembled.undeclared], [f"{c.code}: {c.message}" for c in repairs])
         sides = []
         for part in parts:
             side = joint_side(part, recipe, assembled.units, material.robot, material.drive, trust)
-            done.steps += side.steps
-            done.altered += side.altered
+            done.steps.extend(side.steps)
+            done.altered.extend(side.altered)
             checks += side.checks
             sides.append(side.signals)
-        signals = _on_one_clock(parts, sides, recipe.resample, checks, done)
+        _on_one_clock(parts, sides, recipe.resample, checks, done)
         number = k if len(repaired[0]) > 1 else None
-        log, files = make_log(source, material, assembled, signals, done, number)
+        log, files = make_log(source, material, assembled, done, number)
         checks += examine(log, source.primary, trust)
         made.append((log, files, done))
     return made
@@ -226,12 +219,13 @@ def _on_one_clock(
     sides: Sequence[dict[str, Signal]],
     spec: ResampleSpec | None,
     checks: list[Check],
-    done: Treatment,
-) -> dict[str, Signal]:
-    """Return the signals of a log, its time among them; resampled where the recipe says so."""
+    done: Converted,
+) -> None:
+    """Put the signals of a log in `done`, its time first; resampled where the recipe says so."""
     about_t = schema.SIGNALS["t"][1]
     if spec is None:
-        return {"t": Signal(parts[0].t, "s", about_t), **sides[0]}
+        done.signals.update({"t": Signal(parts[0].t, "s", about_t), **sides[0]})
+        return
     for part in parts:
         recorded = 1.0 / float(np.median(np.diff(part.t)))
         if recorded * REPAIR.finest < spec.rate:
@@ -241,12 +235,12 @@ def _on_one_clock(
             raise UsageError("C02", message, where=part.where, remedy=remedy)
     begin, end = max(float(p.t[0]) for p in parts), min(float(p.t[-1]) for p in parts)
     at = grid(begin, end, spec.rate)
-    signals = {"t": Signal(at, "s", about_t)}
+    done.signals["t"] = Signal(at, "s", about_t)
     method = "natural cubic spline" if spec.method == "spline" else "straight lines"
     for part, side in zip(parts, sides, strict=True):
         for name, signal in side.items():
             values = resample(part.t, signal.values, at, spec.method)
-            signals[name] = replace(signal, values=values)
+            done.signals[name] = replace(signal, values=values)
         ms = 1e3 * np.diff(part.t)
         words = f"resampled from {part.t.size} samples {ms.min():.4g} to {ms.max():.4g} ms apart "
         words += f"(median {np.median(ms):.4g} ms) to {at.size} at {spec.rate:g} Hz, {method}"
@@ -255,7 +249,6 @@ def _on_one_clock(
         remedy = "none needed for fits; record with an even clock where frequencies near the rate"
         checks.append(part.check("T05", words, f"{remedy} matter", "warn"))
         done.altered.append(words)
-    return signals
 
 
 def _preview(log: ExperimentLog) -> tuple[str, ...]:

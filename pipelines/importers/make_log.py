@@ -19,6 +19,7 @@ from pipelines.importers.assemble import Assembled, Material, Source
 from pipelines.importers.patterns import fill
 from pipelines.importers.raw import RawTable
 from pipelines.importers.recipe import ControllerSpec, LogSpec, TableSpec
+from pipelines.importers.units import Converted
 from pipelines.io import schema
 from pipelines.io.limits import FEWEST, recorded_span, shorter_than_period
 from pipelines.io.log import (
@@ -26,7 +27,6 @@ from pipelines.io.log import (
     Controller,
     Derived,
     ExperimentLog,
-    Signal,
     created,
     refuse_unlike_format,
 )
@@ -57,26 +57,10 @@ class SourceFile:
     columns: tuple[str, ...]
 
 
-@dataclass
-class Treatment:
-    """What was done to the samples of a log, in words; what `altered` them makes it a derived one.
-
-    Not frozen: every step of an import adds its own.
-    """
-
-    steps: list[str]  # units, signs, transmission
-    altered: list[str]  # repairs, unwrapping, resampling
-
-
 def make_log(
-    source: Source,
-    material: Material,
-    assembled: Assembled,
-    signals: Mapping[str, Signal],
-    done: Treatment,
-    number: int | None,
+    source: Source, material: Material, assembled: Assembled, done: Converted, number: int | None
 ) -> tuple[ExperimentLog, tuple[SourceFile, ...]]:
-    """Return one log of converted signals with its time, and its files.
+    """Return one log of converted signals, its time among them, and its files.
 
     Args:
         number: of a log that had to be split.
@@ -87,18 +71,18 @@ def make_log(
         UsageError: C02, name, experiment, role or joint cannot be read from the recipe and the
             file's name.
     """
-    recipe, robot, t = material.recipe, material.robot, signals["t"].values
-    about, time = _about(recipe.log, source, recipe.where), recipe.time
+    recipe, robot, signals = material.recipe, material.robot, done.signals
+    about, t = _about(recipe.log, source, recipe.where), signals["t"].values
     name = clean(fill(about.name, source.groups, recipe.where), 200) or "log"
     used = [column for columns in assembled.columns.values() for column in columns]
     files = tuple(
         SourceFile(file, table.sha256, tuple(c for c in used if c in table.columns))
         for file, table in source.tables.items()
     )
-    step = time.sample_time or 1.0 / (time.rate or 1.0)
+    step = recipe.time.sample_time or 1.0 / (recipe.time.rate or 1.0)
     if recipe.resample:
         step = 1.0 / recipe.resample.rate
-    elif time.column is not None:
+    elif recipe.time.column is not None:
         step = float(np.median(np.diff(t)))
     if t.size < FEWEST:
         message = f"{t.size} samples at {1 / step:g} Hz; a log needs {FEWEST}"
@@ -171,7 +155,7 @@ def _controller(spec: ControllerSpec | None) -> Controller | None:
 
 
 def _derived(
-    files: tuple[SourceFile, ...], material: Material, done: Treatment, recorded: str | None
+    files: tuple[SourceFile, ...], material: Material, done: Converted, recorded: str | None
 ) -> Derived:
     # `created` is the time of the recording where the recipe gives it. Where it does not, no honest
     # time is left: the clock on the wall and the times of files differ from one import to the next,

@@ -40,9 +40,9 @@ _TURNS = {"deg": 360.0, "°": 360.0, "rad": 2.0 * math.pi, "mrad": 2000.0 * math
 class Converted:
     """Signals in SI and what was done to them, in words."""
 
+    steps: list[str] = field(default_factory=list)  # units, signs, transmission
+    altered: list[str] = field(default_factory=list)  # more than that: what makes a derived log
     signals: dict[str, Signal] = field(default_factory=dict)
-    steps: list[str] = field(default_factory=list)
-    altered: list[str] = field(default_factory=list)  # beyond units and transmission
     checks: list[Check] = field(default_factory=list)
 
 
@@ -208,7 +208,8 @@ def joint_side(
         _refuse_degrees(part, done.signals["q"].values, units["q"], robot)
     in_degrees = "q" in part.signals and set(units["q"]) <= {"deg", "°"}
     if in_degrees and (starts := _starts(part.signals["q"])):
-        message = f"declared in degrees, but {starts}, digit by digit: radians of the motor side?"
+        message = f"declared in degrees, but the numbers start at {starts}, digit by digit: "
+        message += "radians of the motor side?"
         remedy = 'if so, declare unit = "rad" and add [drive] transmission = the gear ratios'
         at = f"{part.where}, signal q"
         done.checks.append(Check.of("S07", "warn", message, where=at, remedy=remedy))
@@ -218,7 +219,7 @@ def joint_side(
 def _starts(q: Array) -> str:
     """Return at which quarter turns positions start, in words; "" where they do not."""
     turns = quarter_turns(q)
-    return f"it starts at {', '.join(map(str, turns.values()))} times pi/2" if turns else ""
+    return f"{', '.join(map(str, turns.values()))} times pi/2" if turns else ""
 
 
 def _unwrapped(
@@ -374,7 +375,11 @@ def _refuse_degrees(
         degrees = bool(angle.min() >= low - slack and angle.max() <= high + slack)
         if joint.revolute and span > 4.0 * math.pi and (degrees or too_far):
             starts = _starts(q)
-            motor = f"; {starts}, as motors of such gear ratios do at rest" if starts else ""
+            motor = (
+                f"; it starts at {starts}, as motors of such gear ratios do at rest"
+                if starts
+                else ""
+            )
             message += f"looks like {'degrees or ' if degrees else ''}the motor side{motor}"
             remedy = degrees_or_motor(span, (low, high))
             raise InputRejected("S07", message, where=where, remedy=remedy)
