@@ -310,7 +310,7 @@ def _batch(name: str, given: Mapping[str, Any]) -> int:
     from pipelines.io.processors import processors
     from pipelines.stage import Request
 
-    values = vars(common) | vars(own)
+    module, values = module_of(own.stage), vars(common) | vars(own)
     settings = make_settings(own.stage, common.config, common.set, {})
     request = Request((), **_fields_of(Request, values | {"out": None}))
     values |= {
@@ -321,7 +321,7 @@ def _batch(name: str, given: Mapping[str, Any]) -> int:
         "shard": read_shard(own.shard),
     }
     with (progress := console.Progress(common)):
-        plan = Plan(module_of(own.stage), settings, request, **_fields_of(Plan, values))
+        plan = Plan(module, settings, request, **_fields_of(Plan, values))
         outcome = run_batch(plan, progress)
     console.print_outcome(outcome, common)
     failing = [(item.name, item.error) for item in outcome.result.items if item.error is not None]
