@@ -21,7 +21,6 @@ from pipelines.errors import UsageError, did_you_mean
 
 __all__ = ["acting_cause", "refuse_unknown", "wanted_cause"]
 
-
 # whose option it is
 _LISTED_BY = {"--with": "extend", "--exclude": "diagnose", "--discriminate": "design-excitation"}
 
@@ -37,15 +36,20 @@ def acting_cause(text: str, revolute: Sequence[bool], where: str = "--fault",
     Raises:
         UsageError: C01, no such cause or parameter; C02, a joint or number that does not fit.
     """
-    name, *rest = text.split(":")
-    refuse_unknown(text, where, command)
-    kind = find_effect(name)
-    joint, numbers = _place(text, kind, rest, revolute, where)
-    values = _values(text, kind, kind(joint=joint), numbers, where)
-    _refuse_unfit(text, kind, values, joint, len(revolute), where)
-    _refuse_weak(text, kind, values, numbers, where)
-    return Acting.of(kind(joint=joint), values, origin="assumed", revolute=joint is None
-                     or revolute[joint - 1])
+    effect, given = _read(text, revolute, where, command)
+    linear = [q for q in effect.parameters if not q.shape and not q.derived and q.period is None]
+    fixed = effect.parameters.fixed
+    values = (_defaults(effect) if fixed is None else effect.values(fixed)) | given
+    if not given or not any(q.name in given or values[q.name] for q in linear):
+        follows = [q.name for q in effect.parameters if q.derived and q.name in given]
+        words = f"'{text}' does not say how strong it is"
+        if follows:
+            words = f"'{text}': {', '.join(follows)} follows from other numbers"
+        ranges = ", ".join(map(_range, linear if given else effect.parameters))
+        raise UsageError("C02", words, where=where,
+                         remedy=f"give {ranges}" if given else f"give some of {ranges}")
+    turns = effect.joint is None or revolute[effect.joint - 1]
+    return Acting.of(effect, values, origin="assumed", revolute=turns)
 
 
 def wanted_cause(text: str, revolute: Sequence[bool],
@@ -58,24 +62,15 @@ def wanted_cause(text: str, revolute: Sequence[bool],
         UsageError: C01, no such cause or number; C02, a joint or number that does not fit, or one
             that every fit finds anew.
     """
-    name, *rest = text.split(":")
-    refuse_unknown(text, where)
-    kind = find_effect(name)
-    joint, numbers = _place(text, kind, rest, revolute, where)
-    effect = kind(joint=joint)
-    if not numbers:
-        return effect, {}
-    values = _values(text, kind, effect, numbers, where)
-    _refuse_unfit(text, kind, values, joint, len(revolute), where)
-    given = [part.partition("=")[0].strip() for part in numbers.split(",") if part.strip()]
-    shapes = [q.name for q in kind.parameters if q.shape and not q.derived]
-    if linear := [one for one in given if one not in shapes]:
-        raise UsageError(
-            "C02", f"'{text}': {', '.join(linear)} is fitted and takes no value", where=where,
-            remedy=f"a start can be given to {', '.join(shapes)}"
-            if shapes else f"write {text.split(':')[0]}"
-            f"{'' if joint is None else f':{joint}'}")
-    return effect, {one: values[one] for one in given}
+    effect, given = _read(text, revolute, where)
+    shapes = [q.name for q in effect.parameters if q.shape and not q.derived]
+    if linear := [name for name in given if name not in shapes]:
+        remedy = f"write {text.rpartition(':')[0]}"
+        if shapes:
+            remedy = f"a start can be given to {', '.join(shapes)}"
+        raise UsageError("C02", f"'{text}': {', '.join(linear)} is fitted and takes no value",
+                         where=where, remedy=remedy)
+    return effect, given
 
 
 def refuse_unknown(text: str, where: str, command: str = "extend") -> None:
@@ -91,83 +86,61 @@ def refuse_unknown(text: str, where: str, command: str = "extend") -> None:
                          remedy=f"'rrrid {_LISTED_BY.get(where, command)} --help' lists all causes")
 
 
-def _place(text: str, kind: type[Effect], rest: list[str], revolute: Sequence[bool],
-           where: str) -> tuple[int | None, str]:
-    """Return the joint, and the text of the numbers."""
-    numbers = rest.pop() if rest and "=" in rest[-1] else ""
-    place = ":JOINT" if kind.scope == "joint" else ""
-    belongs = f"write {kind.name}{place}{f':{numbers}' if numbers else ''}"
-    wanted = 1 if kind.scope == "joint" else 0
-    if len(rest) != wanted:
-        what = "a joint" if wanted else "no joint, it belongs to the whole arm"
-        raise UsageError("C02", f"'{text}': {kind.name} takes {what}", where=where, remedy=belongs)
-    if not rest:
-        return None, numbers
-    if not (rest[0].isascii() and rest[0].isdigit()) or not 1 <= int(rest[0][:6]) <= len(revolute):
-        raise UsageError("C02", f"'{rest[0]}' is no joint of this arm", where=where,
-                         remedy=f"give one of 1 to {len(revolute)}")
-    joint, able = int(rest[0]), joints_of(kind, revolute)
-    if joint not in able:
-        raise UsageError(
-            "C02", f"'{text}': joint {joint} slides, and only one that turns can have it",
-            where=where,
-            remedy=f"give one of {', '.join(map(str, able))}" if able else "name another cause")
-    return joint, numbers
-
-
-def _values(text: str, kind: type[Effect], effect: Effect, numbers: str,
-            where: str) -> dict[str, float]:
-    known = {quantity.name: quantity for quantity in kind.parameters}
-    fixed = {} if kind.parameters.fixed is None else effect.values(kind.parameters.fixed)
-    values = {
-        q.name: float(getattr(effect, q.name)) if q.shape else fixed.get(q.name, 0.0)
-        for q in kind.parameters
-    }
-    ranges = ", ".join(map(_range, kind.parameters))
-    given = [part.partition("=") for part in numbers.split(",") if part.strip()]
-    if not given:
-        raise UsageError("C02", f"'{text}' does not say how strong it is", where=where,
-                         remedy=f"give some of {ranges}")
-    for name, _, number in given:
-        name = name.strip()
-        if name not in known:
-            raise UsageError("C01",
-                             f"{kind.name} has no parameter '{name}'{did_you_mean(name, known)}",
+def _read(text: str, revolute: Sequence[bool], where: str,
+          command: str = "extend") -> tuple[Effect, dict[str, float]]:
+    """Return the effect at its joint, and the numbers that are given."""
+    refuse_unknown(text, where, command)
+    name, *rest = text.split(":")
+    kind, numbers = find_effect(name), rest.pop() if rest and "=" in rest[-1] else ""
+    effect = kind(joint=_joint(text, kind, rest, numbers, revolute, where))
+    known = {q.name: q for q in kind.parameters}
+    given: dict[str, float] = {}
+    for own, _, number in (part.partition("=") for part in numbers.split(",") if part.strip()):
+        own = own.strip()
+        if own not in known:
+            raise UsageError("C01", f"{name} has no parameter '{own}'{did_you_mean(own, known)}",
                              where=where, remedy=f"its parameters are {', '.join(known)}")
-        values[name] = _number(number, name, where)
-        if not known[name].low <= values[name] <= known[name].high:
-            raise UsageError("C02", f"{name} = {values[name]:g} is out of range", where=where,
-                             remedy=f"it takes {ranges}")
-    return values
+        given[own] = _number(number, own, where)
+        if not known[own].low <= given[own] <= known[own].high:
+            raise UsageError("C02", f"{own} = {given[own]:g} is out of range", where=where,
+                             remedy=f"it takes {', '.join(map(_range, kind.parameters))}")
+    for own, value in (_defaults(effect) | given).items() if given else ():
+        if why := known[own].unfit(value, effect.joint, len(revolute)):
+            raise UsageError("C02", f"'{text}': {why}", where=where,
+                             remedy=f"give {own} another number")
+    return effect, given
+
+
+def _defaults(effect: Effect) -> dict[str, float]:
+    return {q.name: float(getattr(effect, q.name)) if q.shape else 0.0 for q in effect.parameters}
+
+
+def _joint(text: str, kind: type[Effect], rest: list[str], numbers: str,
+           revolute: Sequence[bool], where: str) -> int | None:
+    """Return the joint that stands between the name and the numbers."""
+    def refused(words: str, remedy: str) -> UsageError:
+        return UsageError("C02", words, where=where, remedy=remedy)
+
+    of_joint = kind.scope == "joint"
+    if len(rest) != of_joint:
+        what = "a joint" if of_joint else "no joint, it belongs to the whole arm"
+        place = f"{':JOINT' if of_joint else ''}{f':{numbers}' if numbers else ''}"
+        raise refused(f"'{text}': {kind.name} takes {what}", f"write {kind.name}{place}")
+    if not rest:
+        return None
+    said, able = rest[0], joints_of(kind, revolute)
+    if not (said.isascii() and said.isdigit()) or not 1 <= int(said[:6]) <= len(revolute):
+        raise refused(f"'{said}' is no joint of this arm", f"give one of 1 to {len(revolute)}")
+    if int(said) not in able:
+        remedy = f"give one of {', '.join(map(str, able))}" if able else "name another cause"
+        raise refused(f"'{text}': joint {int(said)} slides, and only one that turns can have it",
+                      remedy)
+    return int(said)
 
 
 def _range(q: Quantity) -> str:
     """"amplitude -50 to 50 N m"; a pure number has no unit to show."""
     return f"{q.name} {q.low:g} to {q.high:g}{'' if q.unit == '1' else f' {q.unit}'}"
-
-
-def _refuse_weak(text: str, kind: type[Effect], values: dict[str, float], numbers: str,
-                 where: str) -> None:
-    """C02, only numbers that do nothing without an amplitude: an order, a frequency."""
-    linear = [q for q in kind.parameters if not q.shape and not q.derived and q.period is None]
-    given = {part.partition("=")[0].strip() for part in numbers.split(",")}
-    if given & {q.name for q in linear} or any(values[q.name] for q in linear):
-        return
-    ranges = ", ".join(map(_range, linear))
-    follows = [q.name for q in kind.parameters if q.derived and q.name in given]
-    what = f"'{text}' does not say how strong it is"
-    if follows:
-        what = f"'{text}': {', '.join(follows)} follows from other numbers"
-    raise UsageError("C02", what, where=where, remedy=f"give {ranges}")
-
-
-def _refuse_unfit(text: str, kind: type[Effect], values: dict[str, float], joint: int | None,
-                  joints: int, where: str) -> None:
-    """C02, a number that names a joint or a link which the arm does not have."""
-    for quantity in kind.parameters:
-        if why := quantity.unfit(values[quantity.name], joint, joints):
-            raise UsageError("C02", f"'{text}': {why}", where=where,
-                             remedy=f"give {quantity.name} another number")
 
 
 def _number(text: str, name: str, where: str) -> float:

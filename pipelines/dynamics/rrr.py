@@ -39,24 +39,24 @@ ACTING = (tuple(range(11)), (0, 1, 2, 3, 9, 10, 11, 12, 13, 14, *_SHARED), (*_SH
 
 _Rows = Array | dict[int, Array]
 
-_MOMENT, _INERTIA = "kg m", "kg m^2"
-_PARAMETERS = (("p1", _INERTIA, "a2^2 m3 + a2 m2 (a2 + 2 x2) - Ixx2 + Iyy2"),
-               ("p2", _INERTIA, "-2 (a2 m2 y2 + Ixy2)"), ("p3", _MOMENT,
-                                                          "m3 (a3 + x3)"), ("p4", _MOMENT, "m3 y3"),
-               ("p5", _INERTIA, "a3 m3 (a3 + 2 x3) - Ixx3 + Iyy3"), ("p6", _INERTIA,
-                                                                     "2 (a3 m3 y3 + Ixy3)"),
-               ("p7", _INERTIA,
-                "2 d2 m2 z2 + d2^2 m2 + 2 (d2 + d3) m3 z3 + (d2 + d3)^2 m3 + Iyy1 + Ixx2 + Ixx3"),
-               ("p8", _INERTIA,
-                "-(d2 + d3) m3 y3 - Iyz3"), ("p9", _INERTIA,
-                                             "-a3 m3 (z3 + d2 + d3) - (d2 + d3) m3 x3 - Ixz3"),
-               ("p10", _INERTIA,
-                "-d2 m2 y2 - Iyz2"), ("p11", _INERTIA,
-                                      "-a2 (m3 (z3 + d2 + d3) + m2 (d2 + z2)) - d2 m2 x2 - Ixz2"),
-               ("p12", _INERTIA, "(a2^2 + a3^2 + 2 a3 x3) m3 + a2 m2 (a2 + 2 x2) + Izz2 + Izz3"),
-               ("p13", _INERTIA,
-                "a3 m3 (a3 + 2 x3) + Izz3"), ("p14", _MOMENT,
-                                              "m2 (x2 + a2) + m3 a2"), ("p15", _MOMENT, "m2 y2"))
+_MOMENTS = ("p3", "p4", "p14", "p15")  # in kg m, the others in kg m^2
+_COMBINATIONS = (
+    "a2^2 m3 + a2 m2 (a2 + 2 x2) - Ixx2 + Iyy2",
+    "-2 (a2 m2 y2 + Ixy2)",
+    "m3 (a3 + x3)",
+    "m3 y3",
+    "a3 m3 (a3 + 2 x3) - Ixx3 + Iyy3",
+    "2 (a3 m3 y3 + Ixy3)",
+    "2 d2 m2 z2 + d2^2 m2 + 2 (d2 + d3) m3 z3 + (d2 + d3)^2 m3 + Iyy1 + Ixx2 + Ixx3",
+    "-(d2 + d3) m3 y3 - Iyz3",
+    "-a3 m3 (z3 + d2 + d3) - (d2 + d3) m3 x3 - Ixz3",
+    "-d2 m2 y2 - Iyz2",
+    "-a2 (m3 (z3 + d2 + d3) + m2 (d2 + z2)) - d2 m2 x2 - Ixz2",
+    "(a2^2 + a3^2 + 2 a3 x3) m3 + a2 m2 (a2 + 2 x2) + Izz2 + Izz3",
+    "a3 m3 (a3 + 2 x3) + Izz3",
+    "m2 (x2 + a2) + m3 a2",
+    "m2 y2",
+)
 
 
 def fits(robot: RobotDescription) -> bool:
@@ -80,7 +80,10 @@ class RRR:
         if not fits(robot):
             raise ValueError(f"'{robot.name}' is not an RRR arm as in Kostić et al. 2004")
         self.robot = robot
-        self.parameters = tuple(BaseParameter(*row) for row in _PARAMETERS)
+        names = [f"p{k}" for k in range(1, 16)]
+        self.parameters = tuple(
+            BaseParameter(name, "kg m" if name in _MOMENTS else "kg m^2", combination)
+            for name, combination in zip(names, _COMBINATIONS, strict=True))
         self.geometry = rrr_kinematics.rrr_geometry(robot)
         self._a2 = robot.joints[1].a
         self._g = -robot.gravity[2]
@@ -240,21 +243,23 @@ def combined(robot: RobotDescription) -> Array:
                                 for key in ("a", "d"))
     d = d2 + d3
     rows: tuple[dict[str, float], ...] = (
-        {"m3": a2**2, "m2": a2**2,
-         "mx2": 2 * a2, "Ixx2": -1.0, "Iyy2": 1.0}, {"my2": -2 * a2,
-                                                     "Ixy2": -2.0}, {"m3": a3, "mx3": 1.0},
-        {"my3": 1.0}, {"m3": a3**2, "mx3": 2 * a3, "Ixx3": -1.0, "Iyy3": 1.0},
-        {"my3": 2 * a3,
-         "Ixy3": 2.0}, {
-             "mz2": 2 * d2,
-             "m2": d2**2, "mz3": 2 * d, "m3": d**2,
-             "Iyy1": 1.0, "Ixx2": 1.0, "Ixx3": 1.0
-         }, {"my3": -d, "Iyz3": -1.0}, {"mz3": -a3, "m3": -a3 * d, "mx3": -d, "Ixz3": -1.0},
-        {"my2": -d2, "Iyz2": -1.0
-         }, {"mz3": -a2, "m3": -a2 * d, "mz2": -a2, "m2": -a2 * d2, "mx2": -d2, "Ixz2": -1.0},
-        {"m3": a2**2 + a3**2, "mx3": 2 * a3, "m2": a2**2, "mx2": 2 * a2, "Izz2": 1.0,
-         "Izz3": 1.0}, {"m3": a3**2, "mx3": 2 * a3, "Izz3": 1.0}, {"mx2": 1.0, "m2": a2,
-                                                                   "m3": a2}, {"my2": 1.0})
+        {"m3": a2**2, "m2": a2**2, "mx2": 2 * a2, "Ixx2": -1.0, "Iyy2": 1.0},
+        {"my2": -2 * a2, "Ixy2": -2.0},
+        {"m3": a3, "mx3": 1.0},
+        {"my3": 1.0},
+        {"m3": a3**2, "mx3": 2 * a3, "Ixx3": -1.0, "Iyy3": 1.0},
+        {"my3": 2 * a3, "Ixy3": 2.0},
+        {"mz2": 2 * d2, "m2": d2**2, "mz3": 2 * d, "m3": d**2}
+        | dict.fromkeys(("Iyy1", "Ixx2", "Ixx3"), 1.0),
+        {"my3": -d, "Iyz3": -1.0},
+        {"mz3": -a3, "m3": -a3 * d, "mx3": -d, "Ixz3": -1.0},
+        {"my2": -d2, "Iyz2": -1.0},
+        {"mz3": -a2, "m3": -a2 * d, "mz2": -a2, "m2": -a2 * d2, "mx2": -d2, "Ixz2": -1.0},
+        {"m3": a2**2 + a3**2, "mx3": 2 * a3, "m2": a2**2, "mx2": 2 * a2, "Izz2": 1.0, "Izz3": 1.0},
+        {"m3": a3**2, "mx3": 2 * a3, "Izz3": 1.0},
+        {"mx2": 1.0, "m2": a2, "m3": a2},
+        {"my2": 1.0},
+    )
     combine = np.zeros((15, 30))
     for row, entries in zip(combine, rows, strict=True):
         for name, value in entries.items():
