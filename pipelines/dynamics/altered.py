@@ -19,7 +19,7 @@ import numpy as np
 
 from pipelines.dynamics.base_parameters import BaseArm
 from pipelines.dynamics.body import Array, RigidBody
-from pipelines.dynamics.chain import inverse_dynamics, regressor
+from pipelines.dynamics.chain import inverse_dynamics, regressor, spatial_inertia
 from pipelines.dynamics.kinematics import Placement, SerialChain, serial_chain
 from pipelines.dynamics.rrr import rigid_body
 
@@ -31,38 +31,23 @@ __all__ = [
 _STATES = 40  # numerics: more rows than any arm has parameters
 _STEP = 1e-3  # numerics: [m] of the difference by a length
 _NONE = 1e-4  # numerics: of the largest: what rounding leaves
-_ROUNDED = 1e-12  # numerics: rounding
-_MOMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # numerics: xx … yz
 
 
 def chain_of(body: RigidBody) -> SerialChain:
     return body.chain if isinstance(body, BaseArm) else serial_chain(body.robot)
 
 
-def _standard_to_base(body: RigidBody) -> Array:
-    """B (parameters, 10 · joints): base parameters p = B φ of standard parameters φ."""
-    if isinstance(body, BaseArm):
-        return body.base.combine
-    found = _in_base(body, regressor(chain_of(body), *_states(body)))
-    found[np.abs(found) < _ROUNDED] = 0.0
-    return found
-
-
 def _states(body: RigidBody) -> tuple[Array, Array, Array]:
-    n, rng = body.robot.n_joints, np.random.default_rng(7)
-    return rng.uniform(-3.0, 3.0,
-                       (_STATES, n)), rng.normal(size=(_STATES, n)), rng.normal(size=(_STATES, n))
+    """Return random q, dq, ddq (states, joints)."""
+    shape, rng = (_STATES, body.robot.n_joints), np.random.default_rng(7)
+    return rng.uniform(-3.0, 3.0, shape), rng.normal(size=shape), rng.normal(size=shape)
 
 
 def _in_base(body: RigidBody, torque: Array) -> Array:
-    """(parameters, columns).
-
-    The base parameters that have these torques (states, joints, columns) at `_states`.
-    """
+    """Return the base parameters (parameters, k) with this torque (states, joints, k) there."""
     ours = body.regressor(*_states(body))
-    return np.asarray(
-        np.linalg.lstsq(ours.reshape(-1, ours.shape[2]), torque.reshape(-1, torque.shape[2]),
-                        rcond=None)[0])
+    flat = torque.reshape(-1, torque.shape[2])
+    return np.asarray(np.linalg.lstsq(ours.reshape(len(flat), -1), flat, rcond=None)[0])
 
 
 def standard_of(body: RigidBody, p: Array) -> Array:
@@ -96,9 +81,8 @@ def with_longer_link(body: RigidBody, link: int, by: float) -> RigidBody:
         length = float(np.linalg.norm(step))
         along = step / length if length else np.array([1.0, 0.0, 0.0])
         moved = Placement(chain.before[link].rotation, step + by * along)
-        return BaseArm(
-            body.robot,
-            replace(chain, before=(*chain.before[:link], moved, *chain.before[link + 1:])))
+        before = (*chain.before[:link], moved, *chain.before[link + 1:])
+        return BaseArm(body.robot, replace(chain, before=before))
     place = link - 1 if body.robot.convention == "dh" else link  # whose a it is
     joints = list(body.robot.joints)
     joints[place] = replace(joints[place], a=joints[place].a + by)
@@ -106,28 +90,27 @@ def with_longer_link(body: RigidBody, link: int, by: float) -> RigidBody:
 
 
 def carry_over(body: RigidBody, other: RigidBody) -> Array:
-    """(parameters of other, parameters of body).
+    """Return the base parameters of the same links in the other arm, as a matrix.
 
-    Base parameters of the same links in the other arm.
+    It is (parameters of other, parameters of body).
     """
-    return np.asarray(
-        _standard_to_base(other) @ _shifted(chain_of(body), chain_of(other)) @ body.links_behind)
+    shifted = _shifted(chain_of(body), chain_of(other))
+    return np.asarray(other.combine @ shifted @ body.links_behind)
 
 
 def masses_beyond(body: RigidBody, link: int) -> Array:
-    """(parameters, k).
+    """Return directions (parameters, k) of base parameters that a longer link moves, beyond others.
 
-    The directions in which a longer link `link` moves the base parameters beyond `carry_over`, by
-    masses of the links behind it that the base parameters of the arm as described do not tell.
+    `carry_over` does not tell them: they are by masses of the links behind it that the base
+    parameters of the arm as described do not tell.
     """
-    bare = _standard_to_base(body)
-    _, size, directions = np.linalg.svd(bare)
+    _, size, directions = np.linalg.svd(body.combine)
     untold = directions[int(np.sum(size > 1e-9 * size[0])):].T
 
     def torque(by: float) -> Array:
         chain = chain_of(with_longer_link(body, link, by))
-        return np.asarray(
-            regressor(chain, *_states(body)) @ _shifted(chain_of(body), chain) @ untold)
+        moved = _shifted(chain_of(body), chain) @ untold
+        return np.asarray(regressor(chain, *_states(body)) @ moved)
 
     moved = _in_base(body, (torque(_STEP) - torque(-_STEP)) / (2.0 * _STEP))
     found, size, _ = np.linalg.svd(moved, full_matrices=False)
@@ -135,9 +118,9 @@ def masses_beyond(body: RigidBody, link: int) -> Array:
 
 
 def _shifted(chain: SerialChain, other: SerialChain) -> Array:
-    """(10 · joints, 10 · joints).
+    """Return the parameters of the same bodies in the other's link frames, as a matrix.
 
-    Parameters of the same bodies, at the same places on their axes, in the other's link frames.
+    At the same places on their axes; (10 · joints, 10 · joints).
     """
     n = chain.n_joints
     out = np.zeros((10 * n, 10 * n))
@@ -148,45 +131,24 @@ def _shifted(chain: SerialChain, other: SerialChain) -> Array:
 
 
 def _moved(by: Array) -> Array:
-    """(10, 10): parameters of a body about a point from which its old origin is `by` (3,) [m].
+    """Return (10, 10): parameters about a point from which the old origin is `by` (3,) [m].
 
-        h' = h + m r,   P' = P + h rᵀ + r hᵀ + m r rᵀ,   P = ∫ x xᵀ dm
+    M' = Xᵀ M X, X what carries a twist about the point to the old origin.
     """
-    if not by.any():
-        return np.eye(10)
-    out = np.zeros((10, 10))
-    for k in range(10):
-        unit = np.zeros(10)
-        unit[k] = 1.0
-        m, h, second = unit[0], unit[1:4], _second_moments(unit[4:])
-        second = second + np.outer(h, by) + np.outer(by, h) + m * np.outer(by, by)
-        out[:, k] = (m, *(h + m * by), *_inertia(second))
-    return out
-
-
-def _second_moments(inertia: Array) -> Array:
-    """P (3, 3) = ∫ x xᵀ dm of Ixx Iyy Izz Ixy Ixz Iyz, products with positive sign.
-
-    P = ½ tr(I) 1 - I on the diagonal.
-    """
-    xx, yy, zz, xy, xz, yz = inertia
-    half = 0.5 * (xx + yy + zz)
-    return np.array([[half - xx, xy, xz], [xy, half - yy, yz], [xz, yz, half - zz]])
-
-
-def _inertia(second: Array) -> Array:
-    trace = np.trace(second)
-    return np.array([(trace if i == j else 0.0) + (-1.0 if i == j else 1.0) * second[i, j]
-                     for i, j in _MOMENTS])
+    x = Placement(np.eye(3), by).twist_matrix
+    moved = np.array([x.T @ spatial_inertia(unit) @ x for unit in np.eye(10)])
+    moment = [moved[:, 5, 5], moved[:, 2, 4], moved[:, 0, 5], moved[:, 1, 3]]  # m, h of h ×
+    inertia = [moved[:, k, k] for k in range(3)]
+    products = [-moved[:, i, j] for i, j in ((0, 1), (0, 2), (1, 2))]
+    return np.array([*moment, *inertia, *products])
 
 
 def tip_parameters(body: RigidBody) -> Array:
-    """(parameters, 10).
+    """Return what each standard parameter of a body at the tip adds to p: (parameters, 10).
 
-    What each standard parameter of a body at the tip, in axes of the last frame, adds to p.
+    In axes of the last frame.
     """
-    chain = chain_of(body)
-    return np.asarray(_standard_to_base(body)[:, -10:] @ _moved(chain.tip))
+    return np.asarray(body.combine[:, -10:] @ _moved(chain_of(body).tip))
 
 
 def gravity_torque(body: RigidBody, q: Array, phi: Array, field: Array) -> Array:

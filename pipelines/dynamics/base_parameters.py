@@ -150,6 +150,7 @@ class BaseArm:
         self.chain = chain or serial_chain(robot)
         self.base = base_set(self.chain, np.random.default_rng(_SEED))
         self.parameters = self.base.parameters
+        self.combine = self.base.combine
 
     @cached_property
     def links_behind(self) -> Array:

@@ -122,6 +122,11 @@ class RigidBody(Protocol):
     parameters: tuple[BaseParameter, ...]
 
     @property
+    def combine(self) -> Array:
+        """(parameters, 10 · joints): p of standard parameters, not to be written to."""
+        ...
+
+    @property
     def links_behind(self) -> Array:
         """(10 · joints, parameters).
 

@@ -23,14 +23,13 @@ from pipelines.dynamics.body import (
     refuse_other_length,
     refuse_other_shapes,
 )
-from pipelines.dynamics.chain import STANDARD, regressor, standard_parameters
+from pipelines.dynamics.chain import STANDARD, standard_parameters
 from pipelines.io.log import Array
 from pipelines.io.robot import RobotDescription
 
 __all__ = ["ACTING", "RRR", "combined", "fits", "rigid_body"]
 
 _TINY = 1e-12  # numerics: rounding
-_STATES, _SEED = 40, 7  # numerics: random states at which the general arm is compared
 
 # The columns that act on each joint. Row three has four columns of row two: the one's end is the
 # other's beginning.
@@ -90,19 +89,20 @@ class RRR:
         self._offset = np.array(self.geometry.offset)
 
     @cached_property
+    def combine(self) -> Array:
+        """(15, 30): p of standard parameters."""
+        return combined(self.robot)
+
+    @cached_property
     def links_behind(self) -> Array:
         """(30, 15): standard parameters that have the torques of p.
 
         They are zero outside the base set of the general arm.
         """
-        general = BaseArm(self.robot)
-        rng = np.random.default_rng(_SEED)
-        states = rng.uniform(-3.0, 3.0, (_STATES, 3)), *rng.normal(size=(2, _STATES, 3))
-        ours, links = self.regressor(*states), regressor(general.chain, *states)
-        found = np.linalg.lstsq(ours.reshape(-1, 15), links.reshape(-1, 30), rcond=None)[0]
-        found[np.abs(found) < _TINY] = 0.0
-        chosen = found[:, list(general.base.chosen)]
-        return np.asarray(general.links_behind @ np.linalg.inv(chosen))
+        base = BaseArm(self.robot).base
+        links = np.zeros((30, 15))
+        links[list(base.chosen)] = np.linalg.inv(self.combine[:, list(base.chosen)])
+        return links
 
     def tip(self, q: Array) -> Array:
         """Return the tip (samples, 3) [m]."""
@@ -217,7 +217,7 @@ class RRR:
         links = [joint.link for joint in self.robot.joints if joint.link is not None]
         if len(links) < self.robot.n_joints:
             return None
-        terms = combined(self.robot) * standard_parameters(links)
+        terms = self.combine * standard_parameters(links)
         return np.array([math.fsum(row) for row in terms])  # to the last bit on any processor
 
     def _trigonometry(self, q2: Array, q3: Array) -> tuple[Array, ...]:
