@@ -23,8 +23,8 @@ from pipelines.diagnosis.prior import RIDGE, Belief, Prior, of_any_size, rubs
 from pipelines.diagnosis.screening import Screened, price, screen
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.unnamed import FORM, Key
-from pipelines.dynamics.config import ORDERS
 from pipelines.effects.base import Effect, FrictionLaw
+from pipelines.effects.config import ORDERS
 from pipelines.estimation.bootstrap import chi2_bound
 from pipelines.estimation.joint_table import Array, Arrow, Indices, Table, by_joint, gains, in_rows
 from pipelines.model.rows.data import END

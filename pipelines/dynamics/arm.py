@@ -50,13 +50,10 @@ class Acting:
 
         `revolute` tells its joint's kind.
         """
-        known = effect.parameters.complete(values)
-        return cls(
-            effect.at(known),
-            tuple(
-                Parameter(q.name, known[q.name], (
-                    std or {}).get(q.name), q.unit_at(revolute), (q.low, q.high), origin)
-                for q in effect.parameters))
+        known, sure = effect.parameters.complete(values), std or {}
+        parameters = tuple(Parameter(q.name, known[q.name], sure.get(q.name), q.unit_at(revolute),
+                                     (q.low, q.high), origin) for q in effect.parameters)
+        return cls(effect.at(known), parameters)
 
     @property
     def values(self) -> dict[str, float]:
@@ -126,17 +123,15 @@ class Arm:
         """The arm without its further effects: rigid body and friction."""
         if not self.effects:
             return self
-        same = ((getattr(self, name), getattr(self.extends, name, None))
-                for name in ("body", "base", "friction"))
-        if self.extends is not None and all(own is known for own, known in same):
+        names = ("body", "base", "friction")
+        if all(getattr(self, name) is getattr(self.extends, name, None) for name in names):
+            assert self.extends is not None
             return self.extends  # one object: what is kept with a motion is found again
         return replace(self, effects=(), extends=None)
 
     def with_body(self, body: RigidBody, p: Array) -> Arm:
         """Return the same arm with another rigid body; its base parameters then are assumed."""
-        base = tuple(Parameter(known.name, float(value), None, known.unit, origin="assumed")
-                     for known, value in zip(body.parameters, p, strict=True))
-        return replace(self, body=body, base=base, uncertainty=None)
+        return replace(self, body=body, base=_base(body, p, "assumed"), uncertainty=None)
 
     def extended(self, *more: Acting) -> Arm:
         """With more effects, each around those before it.
@@ -162,24 +157,24 @@ class Arm:
             return last.effect.apply(motion, arm, last.values,
                                      lambda m, a: predict(m, a, tuple(inner)))
 
+        def nominal() -> Array:
+            rigid = self.body.torque(motion.q, motion.dq, motion.ddq, self.p)
+            return rigid + self.friction_torque(motion) if self.friction else rigid
+
         if self.effects or inside is not None:
             return predict(motion, self.nominal, self.effects)
-        return self._kept("torque", motion, self._nominal_torque).copy()
-
-    def _nominal_torque(self, motion: Motion) -> Array:
-        rigid = self.body.torque(motion.q, motion.dq, motion.ddq, self.p)
-        return rigid + self.friction_torque(motion) if self.friction else rigid
+        return motion.kept(self._key("torque"), nominal).copy()
 
     def friction_torque(self, motion: Motion) -> Array:
         """Torque (samples, joints) [N m] of the friction laws alone.
 
         They see the rigid body, not each other. To be read only.
         """
-        return self._kept("friction", motion, self._friction_torque)
+        return motion.kept(self._key("friction"), lambda: self._friction_torque(motion))
 
-    def _kept(self, kind: str, motion: Motion, work: Callable[[Motion], Array]) -> Array:
-        """Return what `work` makes of a motion, kept with it where its arrays are only read."""
-        return motion.kept((kind, self.body, self.base, self.friction), lambda: work(motion))
+    def _key(self, kind: str) -> tuple[object, ...]:
+        """Return what a torque follows from that is kept with a motion."""
+        return kind, self.body, self.base, self.friction
 
     def _friction_torque(self, motion: Motion) -> Array:
         rigid = replace(self, friction=(), effects=())
@@ -197,10 +192,8 @@ class Arm:
 
         Returns None where one of them is more than that.
         """
-        curves = [
-            law.effect.speed_curve(law.values) for law in self.friction
-            if law.effect.joint in (joint, None)
-        ]
+        curves = [law.effect.speed_curve(law.values) for law in self.friction
+                  if law.effect.joint in (joint, None)]
         known = tuple(curve for curve in curves if curve is not None)
         return known if len(known) == len(curves) else None
 
@@ -222,14 +215,12 @@ class Arm:
         body = rigid_body(robot)
         p = body.known_parameters()
         if p is None:
-            missing = [joint.name for joint in robot.joints if joint.link is None]
+            missing = ", ".join(joint.name for joint in robot.joints if joint.link is None)
             raise UsageError(
-                "C02", f"the links of {', '.join(missing)} are not described", where=robot.name,
-                remedy=
-                "give each joint a [joint.link] with mass, com and inertia, or fit a model to logs")
-        base = tuple(Parameter(known.name, float(value), None, known.unit, origin="known")
-                     for known, value in zip(body.parameters, p, strict=True))
-        return cls(robot.name, body, base)
+                "C02", f"the links of {missing} are not described", where=robot.name,
+                remedy="give each joint a [joint.link] with mass, com and inertia, or fit a model "
+                "to logs")
+        return cls(robot.name, body, _base(body, p, "known"))
 
     @classmethod
     def from_model(cls, model: ModelFile, where: object = "") -> Arm:
@@ -244,9 +235,9 @@ class Arm:
         _same_names(stored, [known.name for known in body.parameters], "base_parameters", where)
         base = tuple(Parameter(s.name, s.value, s.std, s.unit, origin=s.origin, visible=s.visible)
                      for s in (stored[known.name] for known in body.parameters))
-        friction, effects = (tuple(_acting(one, robot.revolute, kind, where) for one in members)
-                             for kind, members in (("friction", model.friction), ("effects",
-                                                                                  model.effects)))
+        friction, effects = (
+            tuple(_acting(one, robot.revolute, kind, where) for one in getattr(model, kind))
+            for kind in ("friction", "effects"))
         return cls(model.name, body, base, friction, effects)
 
     def to_model(self, *, validity: Validity | None = None, sources: Iterable[Source] = (),
@@ -258,6 +249,11 @@ class Arm:
         return ModelFile(self.name, format_robot(self.robot), base,
                          tuple(map(_stored, self.friction)), tuple(map(_stored, self.effects)),
                          validity, tuple(sources), tuple(notes))
+
+
+def _base(body: RigidBody, p: Array, origin: Origin) -> tuple[Parameter, ...]:
+    return tuple(Parameter(known.name, float(value), None, known.unit, origin=origin)
+                 for known, value in zip(body.parameters, p, strict=True))
 
 
 def _stored(acting: Acting) -> StoredEffect:
@@ -282,20 +278,24 @@ def _acting(stored: StoredEffect, revolute: tuple[bool, ...], kind: str, where: 
         raise refused(f": {name} cannot be at joint {joint}",
                       f"it belongs to one {effect.scope}{turning}, and the arm has {joints} joints")
     turns = joint is None or revolute[joint - 1]
-    said = dict(stored.parameters)
-    for q in effect.parameters:
-        if q.unsaid is not None and q.name not in said:
-            said[q.name] = StoredValue(q.unsaid, None, q.unit_at(turns), "assumed")
+    unsaid = {q.name: StoredValue(q.unsaid, None, q.unit_at(turns), "assumed")
+              for q in effect.parameters if q.unsaid is not None}
+    said = unsaid | dict(stored.parameters)
     _same_names(said, [q.name for q in effect.parameters], f"{kind}, {name}", where)
-    given = [(q, said[q.name]) for q in effect.parameters]
-    units = [(q.name, v.unit, q.unit_at(turns)) for q, v in given]
-    if wrong := [f"{one} in {unit}, not {own}" for one, unit, own in units if unit != own]:
+    wrong: list[str] = []
+    unfit: list[str] = []
+    parameters: list[Parameter] = []
+    for q in effect.parameters:
+        v, unit = said[q.name], q.unit_at(turns)
+        wrong += [f"{q.name} in {v.unit}, not {unit}"] if v.unit != unit else []
+        unfit += filter(None, [q.unfit(v.value, joint, joints)])
+        parameters.append(Parameter(q.name, v.value, v.std, v.unit, (q.low, q.high), v.origin))
+    if wrong:
         raise refused(f", {name}: {'; '.join(wrong)}", "write the values in those units")
-    if unfit := list(filter(None, (q.unfit(v.value, joint, joints) for q, v in given))):
+    if unfit:
         raise refused(f", {name}: {'; '.join(unfit)}", "write another number")
-    parameters = tuple(Parameter(q.name, v.value, v.std, v.unit, (q.low, q.high), v.origin)
-                       for q, v in given)
-    return Acting(effect(joint=joint).at({q.name: q.value for q in parameters}), parameters)
+    at = effect(joint=joint).at({q.name: q.value for q in parameters})
+    return Acting(at, tuple(parameters))
 
 
 def _same_names(given: Iterable[str], wanted: list[str], what: str, where: object) -> None:

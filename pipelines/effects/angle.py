@@ -11,11 +11,9 @@ from typing import Any, Self
 import numpy as np
 
 from pipelines.dynamics.body import Array, Motion
-from pipelines.dynamics.config import ORDERS
 from pipelines.dynamics.functions import Functions
-from pipelines.dynamics.orders import orders_along
 from pipelines.effects.base import ArmModel, Pointwise, SpeedCurve, Values
-from pipelines.effects.config import EFFECTS
+from pipelines.effects.config import EFFECTS, ORDERS
 from pipelines.effects.hooks import sign_curve
 
 __all__ = ["Cogging", "PositionFriction", "Spring"]
@@ -110,7 +108,7 @@ class Cogging(_Waves):
         travel, turning = float(np.ptp(self.own(motion.q))), arm.robot.revolute[self.index]
         around = turning and self.goes_round(motion, ORDERS.nearly)
         fewest = 0.0 if around else EFFECTS.fewest_waves * 2.0 * math.pi / max(travel, _STILL)
-        for order in orders_along(travel, turning):
+        for order in _orders_along(travel, turning):
             whole = around and order.is_integer()
             apart = EFFECTS.apart * 2.0 * math.pi / travel if whole else 0.0
             yield replace(self, order=order, harmonics=1, whole=whole, apart=apart, fewest=fewest)
@@ -127,6 +125,26 @@ class Cogging(_Waves):
         others = max(values["amplitude_2"], values["amplitude_3"])
         leads = values["amplitude"] >= EFFECTS.leads * others
         return super().possible(values) and apart and leads and values["order"] >= self.fewest
+
+
+def _orders_along(travel: float, revolute: bool) -> list[float]:
+    """Return orders from the fewest waves in `travel` [rad or m], in half steps of what it tells.
+
+    Over many turns whole ones. Where the joint closes its circle, or nearly, whole orders are among
+    them, on a closed one from one on, for what comes back to where it began is no spring.
+    """
+    travel, turn = max(travel, ORDERS.least), 2.0 * math.pi
+    fewest = ORDERS.waves * turn / travel
+    if revolute and travel > (1.0 - ORDERS.nearly) * turn:
+        first = 1.0 if travel > (1.0 - ORDERS.closed) * turn else math.ceil(fewest)
+        step = 0.5 if travel < 2.0 * turn else 1.0
+        return list(np.arange(first, ORDERS.highest, step).tolist())
+    lowest, highest = max(1.0, fewest), ORDERS.highest
+    if not revolute:  # its wave is counted in 2π metres, its travel is what a turn is to a joint
+        highest = float(np.clip(ORDERS.highest * turn / travel, ORDERS.highest, ORDERS.finest))
+    highest = max(highest, 4.0 * lowest)
+    step = max(math.pi / travel, (highest - 1.0) / ORDERS.most)
+    return list(np.arange(lowest, highest, step).tolist())
 
 
 @dataclass(frozen=True)

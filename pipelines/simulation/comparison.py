@@ -90,29 +90,20 @@ def simulation_errors(arms: Sequence[Arm], motions: Motions) -> list[Simulation]
     soft = any(hook.rate or hook.remembering for hook in hooks)
     slow = soft or any(hook.actuator and hook.states for hook in hooks)
     if all(in_loop(arms[0], log) for log, _ in logs):
-        found = _in_closed_loop(arms, logs, slow)
+        longest = SIMULATION.longest_soft if slow else SIMULATION.longest
+        found = _errors(arms, logs, in_loops(arms, logs, longest), closed=True)
+        first, last = found[0], found[-1]
+        unsure = first is not last and "none" not in (first.how, last.how)
+        more = any(log.n_samples * log.sample_time > longest for log, _ in logs)
+        if more and unsure and not nearer(first, last):
+            positions = in_loops(arms, logs, SIMULATION.longer * longest)
+            longer = _errors(arms, logs, positions, closed=True)
+            found = found if longer[0].how == "none" else longer
         if found[0].how != "none":
             return found
     exact = SIMULATION.exact_soft if soft else SIMULATION.exact
-    found = _told(arms, logs, [_in_windows(arm, logs, exact) for arm in arms], closed=False)
+    found = _errors(arms, logs, [_in_windows(arm, logs, exact) for arm in arms], closed=False)
     return none if found[0].how == "none" else found
-
-
-def _in_closed_loop(arms: Sequence[Arm], logs: Motions, slow: bool) -> list[Simulation]:
-    """Return the errors over the first seconds of the logs, or over longer ones."""
-    longest = SIMULATION.longest_soft if slow else SIMULATION.longest
-    found = _told(arms, logs, in_loops(arms, logs, longest), closed=True)
-    more = any(log.n_samples * log.sample_time > longest for log, _ in logs)
-    if more and _open(found[0], found[-1]):
-        positions = in_loops(arms, logs, SIMULATION.longer * longest)
-        longer = _told(arms, logs, positions, closed=True)
-        found = found if longer[0].how == "none" else longer
-    return found
-
-
-def _open(first: Simulation, last: Simulation) -> bool:
-    """Return whether both could be simulated, and the last is not nearer."""
-    return "none" not in (first.how, last.how) and first is not last and not nearer(first, last)
 
 
 def in_loop(arm: Arm, log: ExperimentLog) -> bool:
@@ -152,34 +143,30 @@ def in_loops(arms: Sequence[Arm], motions: Motions,
     return found
 
 
-def _told(arms: Sequence[Arm], motions: Motions, every: Sequence[list[Positions] | None],
-          closed: bool) -> list[Simulation]:
+def _errors(arms: Sequence[Arm], motions: Motions, every: Sequence[list[Positions] | None],
+            closed: bool) -> list[Simulation]:
     """Return how far each arm is off, of its positions in each log."""
-    found = []
-    for arm, positions in zip(arms, every, strict=True):
-        none = Simulation.none(arm.n_joints)
-        found.append(none if positions is None else _errors(arm, motions, positions, closed))
-    return found
+    return [Simulation.none(arm.n_joints) if positions is None
+            else _error(arm, motions, positions, closed)
+            for arm, positions in zip(arms, every, strict=True)]
 
 
-def _errors(arm: Arm, motions: Motions, positions: Sequence[Positions],
-            closed: bool) -> Simulation:
-    square, away, span = [], [], []
+def _error(arm: Arm, motions: Motions, positions: Sequence[Positions], closed: bool) -> Simulation:
+    square, away, span, measured = [], [], [], []
     for (q, seen, between), (log, _) in zip(positions, motions, strict=True):
         known = np.isfinite(q + seen).all(axis=1)
         square.append(np.square(q[known] - seen[known]))
         away.append(np.sum(np.square(arm.body.tip(q[known]) - arm.body.tip(seen[known])), axis=1))
         span.append(SimulatedSpan(log.name, between * int(known.sum())))
+        measured.append(seen[np.isfinite(seen).all(axis=1)])
     each = np.concatenate(square)
     block = np.arange(len(each)) * SIMULATION.blocks // max(len(each), 1)
-    units = _units(arm, [seen[np.isfinite(seen).all(axis=1)] for _, seen, _ in positions])
-    power = np.bincount(block, each @ units**-2, minlength=SIMULATION.blocks).astype(np.float64)
-    position, tip = np.sqrt(each.mean(axis=0)), float(np.sqrt(np.mean(np.concatenate(away))))
-    if not closed:
-        return Simulation("windowed", position, tip, power, span=tuple(span))
+    weighted = each @ _units(arm, measured)**-2
+    power = np.bincount(block, weighted, minlength=SIMULATION.blocks).astype(np.float64)
     (log, _), (q, seen, _) = motions[0], positions[0]
-    first = Strayed(log.name, log.t[:len(q)] - log.t[0], q - seen)
-    return Simulation("closed-loop", position, tip, power, first, tuple(span))
+    first = Strayed(log.name, log.t[:len(q)] - log.t[0], q - seen) if closed else None
+    return Simulation("closed-loop" if closed else "windowed", np.sqrt(each.mean(axis=0)),
+                      float(np.sqrt(np.mean(np.concatenate(away)))), power, first, tuple(span))
 
 
 def _units(arm: Arm, seen: Sequence[Array]) -> Array:
