@@ -21,7 +21,7 @@ import numpy as np
 
 from pipelines.dynamics.body import Motion
 from pipelines.dynamics.functions import ARRAYS, NUMBERS, Functions
-from pipelines.io.log import Array, Controller
+from pipelines.io.log import Array
 from pipelines.simulation.experiment import Experiment
 
 __all__ = ["Controlling", "Feedback", "ahead_of"]
@@ -68,32 +68,25 @@ class Feedback:
         """Take the gains of `joint` (from 0), or of all joints as columns."""
         law = experiment.controller
 
-        def own(values: Array | None, default: float = 0.0) -> Any:
+        def own(values: Array | None) -> Any:
             if values is None:
-                values = np.full(experiment.n_joints, default)
+                values = np.zeros(experiment.n_joints)
             return values[:, None] if joint is None else float(values[joint])
 
         self.functions: Functions = ARRAYS if joint is None else NUMBERS
         self.kp, self.kd, self.ki = own(law.kp), own(law.kd), own(law.ki)
         self.integrating = bool(np.any(self.ki))
-        self.sample_time = experiment.sample_time
-        self.integral: Any = 0.0
-        self.gain = None
+        self.sample_time, self.integral = experiment.sample_time, 0.0
+        self.gain, self.estimate = None, _backward_difference(experiment.sample_time)
         if law.observer_gain is not None:
             self.gain = tuple(own(column) for column in law.observer_gain.T)
-        self.estimate = self.estimator(law)
+        if law.velocity == "observer" and self.gain is not None:
+            self.estimate = _observer(self.gain, experiment.sample_time)
         self.seen: tuple[Any, Any] = (0.0, 0.0)  # the last estimate
         self.counts = _counter(own(experiment.resolution), self.functions)
         self.steps = _counter(own(law.torque_resolution), self.functions)
         self.limit = None if law.output_limit is None else own(law.output_limit)
-        self.waiting = own(experiment.tau0)  # of a delayed command
-        self.delay = bool(law.delay)
-
-    def estimator(self, law: Controller) -> Estimate:
-        """Return what tells error and speed by the log's own rule."""
-        if law.velocity == "observer" and self.gain is not None:
-            return _observer(self.gain, self.sample_time)
-        return _backward_difference(self.sample_time)
+        self.waiting, self.delay = own(experiment.tau0), bool(law.delay)  # of a delayed command
 
     def __call__(self, error: Any, ahead: Any) -> Any:
         """Return -Kp ē - Kd dē - Ki ∫e and what is `ahead` [N m]."""
@@ -121,7 +114,7 @@ class Feedback:
 
 
 def _counter(step: Any, m: Functions) -> Callable[[Any], Any] | None:
-    """Return what counts in steps; None where there are none, one too fine to see beside others."""
+    """Return what counts in steps; None where there are none."""
     if not np.any(step):
         return None
     fine = m.where(step > 0.0, step, 1e-15)  # numerics: a joint without steps beside others
@@ -132,8 +125,7 @@ class Controlling:
     """The controllers of all replicas in arrays. Joints first, replicas last."""
 
     def __init__(self, experiment: Experiment, replicas: int) -> None:
-        self._experiment = experiment
-        self._feedback = Feedback(experiment)
+        self._experiment, self._feedback = experiment, Feedback(experiment)
         self._zeros = np.zeros((experiment.n_joints, replicas))
         self._seen: Estimate | None = None
         if experiment.controller.law == "computed-torque" and self._feedback.gain is not None:
@@ -162,28 +154,28 @@ class Controlling:
 
     def _fed_back(self, k: int, q: Array) -> tuple[Array, Array, Array]:
         """Return what a model is linearised about, errors of position and speed, and feedback."""
-        experiment = self._experiment
-        error = q - experiment.q_ref[k][:, None]
-        v = 0.0 if experiment.v is None else experiment.v[k]
-        ahead = v[:, None] if isinstance(v, np.ndarray) and v.ndim == 1 else v
-        feedback = self._feedback(error, ahead)
+        error = q - self._experiment.q_ref[k][:, None]
+        v: Any = 0.0 if self._experiment.v is None else self._experiment.v[k]
+        feedback = self._feedback(error, v[:, None] if np.ndim(v) == 1 else v)
         seen = self._feedback.seen if self._seen is None else self._seen(error)
         return *seen, feedback
 
     def _law(self, k: int | slice, e: Array, de: Array, feedback: Array) -> Array:
-        experiment = self._experiment
-        ahead = None if self._ahead is None else np.atleast_2d(self._ahead[k]).T
+        experiment, model = self._experiment, self._experiment.feedforward_arm
+        ahead = 0.0 if self._ahead is None else np.atleast_2d(self._ahead[k]).T
         if experiment.controller.law != "computed-torque":
-            torque = feedback if ahead is None else feedback + ahead
+            torque = feedback + ahead
             if experiment.driven is not None and experiment.tau is not None:
                 torque[experiment.driven] = np.atleast_2d(experiment.tau[k, experiment.driven]).T
-            return torque
-        assert experiment.feedforward_arm is not None  # Experiment.of_log refuses the law without
-        body, p = experiment.feedforward_arm.body, experiment.feedforward_arm.p
+            return np.asarray(torque)
+        assert model is not None  # Experiment.of_log refuses the law without
         q, dq = experiment.q_ref[k] + e.T, experiment.dq_ref[k] + de.T
-        parts = body.torque_parts(q, dq, feedback.T, p)
-        torque = sum((getattr(parts, name) for name in self._rigid), np.zeros(e.T.shape)).T
-        return np.ascontiguousarray(torque if ahead is None else torque + ahead)
+        if self._rigid == _RIGID:
+            torque = model.body.torque(q, dq, feedback.T, model.p).T
+        else:
+            parts = model.body.torque_parts(q, dq, feedback.T, model.p)
+            torque = sum((getattr(parts, name) for name in self._rigid), np.zeros(e.T.shape)).T
+        return np.ascontiguousarray(torque + ahead)
 
 
 def ahead_of(experiment: Experiment) -> Array:
