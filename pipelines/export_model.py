@@ -33,13 +33,15 @@ from pipelines.export.states import course, random_states
 from pipelines.export.table import TABLE
 from pipelines.export.target import Cause, Held, Loaded, Target, folded, held_by, rms
 from pipelines.export.urdf import URDF
-from pipelines.io.log import ExperimentLog
+from pipelines.io.log import ExperimentLog, recording
 from pipelines.io.model_file import ModelFile, read_covariance, read_model, write_covariance
 from pipelines.io.option import option
 from pipelines.io.output import write_text
 from pipelines.io.schema import joint_unit
 from pipelines.quality.segments import Mask
 from pipelines.report.report import Report
+from pipelines.simulation.plant import Plant
+from pipelines.simulation.replay import held_torque, simulate_windows
 from pipelines.stage import Inputs, Request, Stage, read_logs
 
 __all__ = ["STAGE", "Card", "Settings", "compute", "read", "report"]
@@ -128,14 +130,14 @@ def compute(inputs: Inputs, settings: Settings) -> Card:
         values = links.base @ links.phi.ravel()
         base = (replace(q, value=float(x)) for q, x in zip(flat.base, values, strict=True))
         held_flat = replace(flat, base=tuple(base), extends=None)
-    logged = [(opened.log, *_motion(opened.log)) for opened in inputs.logs]
-    motion = logged[0][1] if logged else course(arm.robot, validity)
-    held = held_by(target, held_flat, links, motion)
+    logged = [(opened.log, _motion(opened.log)) for opened in inputs.logs]
+    whole_range = course(arm.robot, validity)
+    motion = logged[0][1][0] if logged else whole_range
+    held = held_by(target, held_flat, links, whole_range, motion)
     texts, notes = target.write(held)
-    whole, torque = target.seen(arm), target.seen(arm).torque(motion)
+    torque = target.seen(arm).torque(motion)
     there = target.load(texts, held, motion)
-    replays = tuple(_replayed(log, moved, good, whole, target.load(texts, held, moved))
-                    for log, moved, good in logged)  # fmt: skip
+    replays = tuple(_replayed(log, moved, arm, (target, held)) for log, moved in logged)
     _, assumed, impossible = prior_links(arm.robot)
     nearest = None if links.exact else rms(flat.torque(motion) - held_flat.torque(motion))
     said = Consistency(links.exact, links.distance, links.conflicts, impossible, assumed, nearest)
@@ -183,11 +185,23 @@ def _motion(log: ExperimentLog) -> tuple[Motion, Mask]:
 
 
 def _replayed(
-    log: ExperimentLog, motion: Motion, good: Mask, arm: Arm, there: Loaded | None
+    log: ExperimentLog, moved: tuple[Motion, Mask], arm: Arm, made: tuple[Target, Held]
 ) -> Replay:
-    tau = log.tau
+    """Return how far model and file are off a log; where the target simulates, in position too."""
+    (motion, good), (target, held), tau = moved, made, log.tau
+    texts = target.write(held)[0]
+    there, ours, theirs = target.load(texts, held, motion), None, None
+    if target.simulate is not None:
+        held_tau, step = held_torque(recording(log)), log.sample_time
+        length = max(2, round(EXPORT.window / step))
+        windows = simulate_windows(Plant.of(arm), motion, held_tau, step, length, good)
+        q = target.simulate(texts, held, motion, held_tau, windows)
+        inside = np.isfinite(windows.q).all(axis=1)
+        ours = rms((windows.q - motion.q)[inside])
+        theirs = None if q is None else rms((q - motion.q)[inside])
     error = None if there is None else rms((tau - there.torque)[good])
-    return Replay(log.name, rms(tau[good]), rms((tau - arm.torque(motion))[good]), error)
+    model_error = rms((tau - arm.torque(motion))[good])
+    return Replay(log.name, rms(tau[good]), model_error, error, ours, theirs)
 
 
 def _causes(held: Held, target: Target, motion: Motion, there: Loaded | None) -> tuple[Cause, ...]:

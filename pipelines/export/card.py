@@ -62,6 +62,9 @@ class Replay:
     torque_rms: Array  # [N m] (joints,) measured
     model_error: Array  # [N m] rms
     export_error: Array | None  # [N m] rms; null where the target is not installed
+    # [rad] rms (joints,), simulated in windows of 0.1 s minus measured; null but for mjcf
+    model_position_error: Array | None
+    export_position_error: Array | None
 
 
 @dataclass(frozen=True)
@@ -131,6 +134,11 @@ def _proof(result: Card) -> tuple[Table, ...]:
         shown = {"measured, rms": one.torque_rms, "error of the model": one.model_error}
         shown["error of the file"] = one.export_error
         tables.append(_by_joint(result.joints, shown, f"The log {one.name}, replayed [N m]."))
+        if one.export_position_error is not None:
+            shown = {"simulated by the model": one.model_position_error}
+            shown["simulated by the target"] = one.export_position_error
+            caption = f"Position error of {one.name}, in windows of 0.1 s under its torque [rad]."
+            tables.append(_by_joint(result.joints, shown, caption))
     return tuple(tables)
 
 

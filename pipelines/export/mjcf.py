@@ -21,11 +21,12 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from pipelines.dynamics.arm import Acting
-from pipelines.dynamics.body import Motion
+from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.kinematics import Placement
 from pipelines.export.config import EXPORT
 from pipelines.export.target import ExportJoint, Held, JointTerms, Loaded, Target
 from pipelines.export.urdf import numbers, text_of
+from pipelines.simulation.replay import Windows
 
 __all__ = ["mjcf"]
 
@@ -42,7 +43,9 @@ def mjcf() -> Target:
     forward = ("torque_saturation", "drive_lag")
     columns = 4 if polynomials else 2
     carry = partial(_carry, polynomials=polynomials)
-    return Target(carry, _write, _load, "mujoco", columns=columns, forward_only=forward)
+    return Target(
+        carry, _write, _load, "mujoco", columns=columns, forward_only=forward, simulate=_simulate
+    )
 
 
 def _carry(acting: Acting, polynomials: bool) -> Acting | None:
@@ -103,6 +106,9 @@ def _body(parent: Element, joint: ExportJoint, terms: JointTerms) -> Element:
         ("springref", terms.rest),
     ):
         words |= {key: repr(value)} if value else {}
+    if terms.friction:
+        words["solreffriction"] = f"{EXPORT.friction_time} 1"
+        words["solimpfriction"] = "0.99 0.999 0.001"
     for key, values in (("damping", terms.damping), ("stiffness", terms.stiffness)):
         words |= {key: numbers(values if any(values[1:]) else values[:1])} if any(values) else {}
     SubElement(body, "joint", words)
@@ -147,3 +153,34 @@ def _load(texts: Mapping[str, str], held: Held, motion: Motion) -> Loaded | None
     tau -= np.array([drive.biasprm[0] for drive in drives])
     tau /= np.array([drive.gainprm[0] for drive in drives])
     return Loaded(f"MuJoCo {mujoco.__version__}", tau)
+
+
+def _simulate(
+    texts: Mapping[str, str], held: Held, motion: Motion, tau: Array, windows: Windows
+) -> Array | None:
+    """Return positions by MuJoCo's own integrator in the windows of a log, NaN elsewhere.
+
+    Each window starts at the state of the log; the drives get its torque.
+    """
+    if find_spec("mujoco") is None:
+        return None
+    import mujoco
+
+    (text,) = texts.values()
+    model = mujoco.MjModel.from_xml_string(text)
+    model.opt.timestep = motion.sample_time
+    data, q = mujoco.MjData(model), np.full_like(motion.q, np.nan)
+    joints = [model.joint(joint.name) for joint in held.joints]
+    positions, speeds = ([int(getattr(j, k)[0]) for j in joints] for k in ("qposadr", "dofadr"))
+    drives = [model.actuator(f"{joint.name}_drive").id for joint in held.joints]
+    for first in windows.first:
+        mujoco.mj_resetData(model, data)
+        data.qpos[positions], data.qvel[speeds] = motion.q[first], motion.dq[first]
+        for j, drive in enumerate(drives):
+            if model.actuator_actadr[drive] >= 0:  # a lagging drive has settled
+                data.act[model.actuator_actadr[drive]] = tau[first, j]
+        for k in range(first, first + windows.length):
+            q[k] = data.qpos[positions]
+            data.ctrl[drives] = tau[k]
+            mujoco.mj_step(model, data)
+    return q

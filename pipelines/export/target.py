@@ -132,6 +132,8 @@ class Target:
     consistent: bool = True  # it holds links, which must exist; else base parameters
     columns: int = 0  # how many of sign(v), v, v |v|, v^3 it has for other causes
     forward_only: tuple[str, ...] = ()  # carried in a simulation, not in inverse dynamics
+    # positions in windows of a log, where the target simulates
+    simulate: Callable[..., Array | None] | None = None
     # written with an error that is measured, and how
     approximated: Mapping[str, str] = field(default_factory=dict)
 
@@ -170,8 +172,12 @@ def _weight(sine: float, cosine: float) -> Acting:
     return Acting.of(effect, values | wave, origin="assumed")
 
 
-def held_by(target: Target, arm: Arm, links: Links, motion: Motion) -> Held:
-    """Return what a target holds of a folded arm; other causes are fitted over a motion."""
+def held_by(target: Target, arm: Arm, links: Links, course: Motion, motion: Motion) -> Held:
+    """Return what a target holds of a folded arm.
+
+    Other causes are fitted over `course`, which has all speeds that the model is valid for, and
+    their cost is measured on `motion`.
+    """
     kept = dict[Acting, Acting | None]()
     for acting in (*arm.friction, *arm.effects):
         known = {(a.effect.name, a.effect.joint) for a, held in kept.items() if held is not None}
@@ -183,13 +189,13 @@ def held_by(target: Target, arm: Arm, links: Links, motion: Motion) -> Held:
     terms = _terms(exact)
     fits = np.zeros((arm.n_joints, 4))
     if target.columns:
-        missing = target.seen(arm).torque(motion) - target.seen(exact).torque(motion)
-        fits = _fitted(motion, missing * [term.gain for term in terms], target.columns)
+        missing = target.seen(arm).torque(course) - target.seen(exact).torque(course)
+        fits = _fitted(course, missing * [term.gain for term in terms], target.columns)
         terms = [
             replace(term, friction=dry, damping=tuple(np.add(term.damping, more).tolist()))
             for term, (dry, *more) in zip(terms, fits.tolist(), strict=True)
         ]
-    causes = [_cause(target, arm, acting, held, motion) for acting, held in kept.items()]
+    causes = [_cause(target, arm, held, course, motion) for held in kept.items()]
     (root, *links_named, tip), joints_named, axes, notes = _names(arm.robot)
     chain, joints, before = chain_of(arm.body), list[ExportJoint](), _NOWHERE
     for i, described in enumerate(arm.robot.joints):
@@ -219,23 +225,27 @@ def _chosen(arm: Arm, choose: Callable[[Acting], Acting | None]) -> Arm:
     return replace(arm, friction=friction, effects=effects, extends=None)
 
 
-def _cause(target: Target, arm: Arm, acting: Acting, held: Acting | None, motion: Motion) -> Cause:
-    """Return the fate of a cause; it costs what the best fit of it alone leaves."""
-    if held is acting:
+def _cause(
+    target: Target, arm: Arm, held: tuple[Acting, Acting | None], course: Motion, motion: Motion
+) -> Cause:
+    """Return the fate of a cause; it costs what the best fit of it alone leaves on the motion."""
+    acting, own = held
+    if own is acting:
         return Cause(acting.place, "exactly")
-    whole = arm.torque(motion)
-    other = _chosen(arm, lambda one: held if one is acting else one)
-    lost = whole - other.torque(motion)
-    parts = _speed_columns(motion.dq)[:, : target.columns]
-    rest = lost.copy()
+    other = _chosen(arm, lambda one: own if one is acting else one)
+    lost, rest = (arm.torque(m) - other.torque(m) for m in (course, motion))
+    costly, parts = rms(rest), _speed_columns(course.dq)[:, : target.columns]
+    left, there = lost.copy(), _speed_columns(motion.dq)[:, : target.columns]
     for j, x in enumerate(lost.T):
-        rest[:, j] -= parts[..., j] @ np.linalg.lstsq(parts[..., j], x, rcond=None)[0]
-    explained = float(np.sum(rest**2)) < (1.0 - EXPORT.explained) * float(np.sum(lost**2))
-    cost = rms(rest if explained else lost)
-    share = float(cost.max() / max(rms(whole).max(), 1e-300))
+        fit = np.linalg.lstsq(parts[..., j], x, rcond=None)[0]
+        left[:, j] -= parts[..., j] @ fit
+        rest[:, j] -= there[..., j] @ fit
+    explained = float(np.sum(left**2)) < (1.0 - EXPORT.explained) * float(np.sum(lost**2))
+    cost = rms(rest) if explained else costly
+    share = float(cost.max() / max(rms(arm.torque(motion)).max(), 1e-300))
     how = "by friction and damping of the joint" if explained else ""
-    how = f"in part, {how}".strip(", ") if held is not None else how
-    known = explained or held is not None
+    how = f"in part, {how}".strip(", ") if own is not None else how
+    known = explained or own is not None
     return Cause(acting.place, "approximated" if known else "lost", how, cost, share)
 
 

@@ -63,7 +63,8 @@ def exported(arm: Arm, to: str) -> Exported:
     """An arm written for a target."""
     target, flat = TARGETS[to](), folded(arm)
     links = consistent_links(flat.body, flat.p, np.full((len(flat.p),) * 2, np.nan))
-    held = held_by(target, flat, links, course(arm.robot, None))
+    motion = course(arm.robot, None)
+    held = held_by(target, flat, links, motion, motion)
     texts, notes = target.write(held)
     return Exported(target, flat, links, held, texts, (*held.notes, *notes))
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines import estimate_bps
 from pipelines.errors import InputRejected, RrridError, UsageError
 from pipelines.export_model import STAGE, Card, Settings
 from pipelines.io.files import write_log
@@ -93,6 +94,18 @@ def test_a_log_is_replayed_under_both(tmp_path: Path) -> None:
             assert replay.export_error == pytest.approx(replay.model_error, rel=1e-9)
         else:
             assert (replay.export_error >= 0.9 * replay.model_error).all()
+
+
+@pytest.mark.slow
+def test_mujoco_simulates_a_log_as_well_as_the_model(tmp_path: Path, samples: Path) -> None:
+    """Windows of held-out writing of the test bench: within 5 % of the error of our own integrator."""
+    logs = tuple(samples / f"rrr-healthy/{name}.h5" for name in ("excitation-1", "excitation-2", "free-1", "writing-6"))
+    estimated = run_stage(estimate_bps.STAGE, Request(logs, out=tmp_path / "bps", no_report=True), estimate_bps.Settings())
+    settings = Settings(str(estimated.folder / "model.json"), "mjcf")
+    (replay,) = export(tmp_path, settings, samples / "rrr-healthy/writing-6.h5").result.replays
+    assert replay.model_position_error is not None
+    assert replay.export_position_error is not None
+    assert (replay.export_position_error <= 1.05 * replay.model_position_error).all()
 
 
 def test_without_the_target_the_file_is_written_and_the_proof_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
