@@ -20,7 +20,7 @@ import numpy as np
 
 from pipelines.dynamics.arm import Arm
 from pipelines.errors import Check, NothingMatched, UsageError
-from pipelines.frequency.config import GroupingConfig, SwingConfig
+from pipelines.frequency.config import GroupingConfig, ReportConfig
 from pipelines.frequency.findings import Findings, Seen, frf_findings
 from pipelines.frequency.grouping import Finding, Open, advance
 from pipelines.frequency.modes import BAND
@@ -206,7 +206,7 @@ def _turning(m: Measured) -> list[Check]:
             "response"
         )
         remedy = "let it turn slowly while it is excited"
-    elif swing > SwingConfig().swing * speed:
+    elif swing > ReportConfig().swing * speed:
         words = (
             f"the excitation swings the speed of joint {m.joint} by {swing:.2g} about {speed:.2g} "
             "rad/s: friction now and then turns its sign, which adds damping"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 __all__ = ["BandConfig", "GroupingConfig", "HeldConfig", "LinesConfig", "ModesConfig"]
 __all__ += ["PolynomialConfig", "RationalConfig", "ResponseConfig", "SignConfig", "SpringsConfig"]
-__all__ += ["SwingConfig", "TurningConfig"]
+__all__ += ["ReportConfig", "TurningConfig"]
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,6 @@ class TurningConfig:
     still: float = 1e-3  # [rad/s] a slower joint does not turn: a turn in two hours
     same: float = 1e-9  # of the largest v, two periods are equal: rounding of ten digits of text
     lost: float = 0.1  # of the samples; beyond, what is filled in weighs as much (-20 dB)
-    line: float = 1e-3  # of the strongest line's amplitude: -60 dB, above leakage and rounding
     alike: float = 0.9  # of the autocorrelation at no lag, from which a lag may be a period
 
 
@@ -56,7 +55,7 @@ class PolynomialConfig:
 class LinesConfig:
     """Lines of a periodic excitation."""
 
-    excited: float = 1e-3  # of the strongest amplitude: what is weaker is no line
+    excited: float = 1e-3  # of the strongest amplitude: -60 dB, above leakage and rounding
     freedom: int = 10  # degrees of freedom of the noise at a line
     order: int = 2  # of the polynomial that the transient follows round a line
     shortest: int = 4  # samples of a period: one harmonic
@@ -138,7 +137,6 @@ class ModesConfig:
     # relative std of a damping beside noise: on the bench, swings of a tenth change it by 2-6 %
     by_friction: float = 0.03
     straight: tuple[float, float] = (8.0, 150.0)  # [Hz] over which level and delay are taken
-    floor: float = 1e-3  # relative deviation that every bin has at least
     vague: float = 0.1  # relative variance of a bin that tells nothing of level and delay
     fewest: int = 12  # bins
     stuck: float = 3.0  # misfit that a search which found the modes hardly leaves
@@ -155,7 +153,6 @@ class ModesConfig:
 class SpringsConfig:
     """The fit of masses and springs."""
 
-    floor: float = 1e-3  # relative deviation of a frequency: that of every bin of the fit
     known: float = 1e-9  # the same of an inertia that is exactly known
     singular: float = 1e-12  # of J: a lighter body is lost in the sums of the mass matrix
     rotor: float = 0.95  # of the least J, at most turns behind a gear
@@ -196,14 +193,13 @@ class SignConfig:
 
     slow: float = 20.0  # [Hz] up to which friction and delay turn the phase by less than 90°
     first: float = 2.0  # times the lowest excited frequency: between two modes it is turned round
-    reliable: float = 0.7  # coherence
     fewest: int = 3  # bins
     against: float = -0.5  # cosine of the phase: beyond 120°
 
 
 @dataclass(frozen=True)
-class SwingConfig:
-    """Limits of the stage's warnings."""
+class ReportConfig:
+    """Limits of what is reported, and warned of."""
 
     swing: float = 0.25  # of the turning speed: four deviations of it turn friction's sign
     coherence: float = 0.7  # Kostić et al. 2004, Section IV.D: less is not reliable

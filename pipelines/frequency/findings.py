@@ -21,7 +21,7 @@ import numpy as np
 
 from pipelines.dynamics.arm import Arm
 from pipelines.errors import InputRejected, RrridError
-from pipelines.frequency.config import GroupingConfig, SignConfig
+from pipelines.frequency.config import GroupingConfig, ReportConfig, SignConfig
 from pipelines.frequency.grouping import Finding, Open, group_joint, seen_elsewhere
 from pipelines.frequency.modes import BAND, Modes, fitted_modes, relative_acceleration, tells
 from pipelines.frequency.responses import How, Measured, measured_responses
@@ -120,7 +120,7 @@ def grouped(
 
 def _check_sign(measured: Measured) -> None:
     whole = relative_acceleration(measured)
-    reliable = whole.coherence >= _CONFIG.reliable
+    reliable = whole.coherence >= ReportConfig().coherence
     whole = whole.where(measured.excited.holds(whole.frequency) & reliable)
     slow = whole.within(0.0, _CONFIG.slow)
     slow = slow.within(0.0, _CONFIG.first * float(slow.frequency.min(initial=_CONFIG.slow)))

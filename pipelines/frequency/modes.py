@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.frequency.config import ModesConfig
+from pipelines.frequency.config import ModesConfig, RationalConfig
 from pipelines.frequency.controller import double_integrator, loop_delay
 from pipelines.frequency.rational import FEWEST, Known, Mode, Rational, fit_rational, scattered
 from pipelines.frequency.responses import Measured
@@ -198,7 +198,7 @@ def _level_and_delay(rest: FrequencyResponse) -> tuple[Known, Known]:
     if len(part.frequency) < _CONFIG.fewest:
         size = float(np.median(np.abs(rest.response)))
         return Known(size, np.inf), Known(0.0, np.inf)
-    relative = np.maximum(relative[relative < _CONFIG.vague], _CONFIG.floor**2)
+    relative = np.maximum(relative[relative < _CONFIG.vague], RationalConfig().floor ** 2)
     weight, omega = 1.0 / relative, 2.0 * np.pi * part.frequency
     # the delay that lays all phases on zero best: no phase has to be unwrapped then
     tried = np.arange(-_CONFIG.longest, _CONFIG.longest, 0.5 / float(omega.max()))

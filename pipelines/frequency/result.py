@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.frequency.config import SwingConfig
+from pipelines.frequency.config import ReportConfig
 from pipelines.frequency.findings import Seen
 from pipelines.frequency.modes import relative_acceleration
 from pipelines.frequency.rational import Known, Mode
@@ -17,7 +17,7 @@ from pipelines.frequency.spectra import Array, Complex, FrequencyResponse, bands
 __all__ = ["COHERENCE", "Band", "Curve", "Method", "Posture", "methods_of", "posture_of"]
 __all__ += ["same_bins"]
 
-_CONFIG = SwingConfig()
+_CONFIG = ReportConfig()
 COHERENCE = _CONFIG.coherence  # numerics: a response of less is not reliable
 Band = tuple[float, float]
 

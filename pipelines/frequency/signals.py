@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from pipelines.errors import InputRejected
 from pipelines.estimation.grids import through
-from pipelines.frequency.config import TurningConfig
+from pipelines.frequency.config import LinesConfig, TurningConfig
 from pipelines.frequency.spectra import Array, Mask
 from pipelines.io.limits import GAP_LIMIT, LARGEST_JITTER, SHORTEST, percent
 from pipelines.io.log import Controller, ExperimentLog
@@ -102,7 +102,7 @@ class Turned:
         if self.period is None:
             return ()
         size = np.abs(np.fft.rfft(np.nan_to_num(self.whole[: self.period, V])))
-        return tuple(np.flatnonzero(size > _CONFIG.line * size.max()).tolist())
+        return tuple(np.flatnonzero(size > LinesConfig().excited * size.max()).tolist())
 
     def settings(self) -> tuple[object, ...]:
         """Return what two logs must share to be averaged, but for their posture."""

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.estimation.bounded import Minimum, least_squares
-from pipelines.frequency.config import ModesConfig, SpringsConfig
+from pipelines.frequency.config import ModesConfig, RationalConfig, SpringsConfig
 from pipelines.frequency.modes import Pair
 from pipelines.frequency.spectra import Array
 
@@ -132,7 +132,7 @@ def explain(
     best = min((least_squares(rest, start) for start in starts), key=_misfit)
     # the rest, not what was granted, says how well the numbers are known
     weight = np.ones(len(best.rest))
-    weight[: spread.size] = (spread / np.hypot(std, _CONFIG.floor)).ravel()
+    weight[: spread.size] = (spread / np.hypot(std, RationalConfig().floor)).ravel()
     freedom = spread.size - numbers
     left = float(((best.rest * weight) ** 2).sum()) / max(freedom, 1)
     jac = best.slope * weight[:, None]
