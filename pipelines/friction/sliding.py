@@ -24,7 +24,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -32,7 +31,7 @@ import numpy.typing as npt
 from pipelines.dynamics.body import Array
 from pipelines.estimation.bootstrap import by_flips
 from pipelines.estimation.bounded import least_between
-from pipelines.estimation.varpro import held_out
+from pipelines.estimation.varpro import Linear, held_out
 from pipelines.friction.config import DriftConfig, SlidingConfig
 from pipelines.friction.fit import LawEquations
 from pipelines.friction.laws import OneJoint
@@ -41,8 +40,9 @@ from pipelines.friction.weak_form import Course, Mask, Stretch, blocks_of_time
 
 __all__ = ["Sliding", "drift_of", "left_out", "sliding_rows"]
 
-FINE = 1e-2  # numerics: of the logarithm of a time constant
 RANK = 1e-7  # numerics: singular values of unit columns below it: two columns that are one
+ALIKE = 1e-9  # numerics: relative, of sums of squares over all rows
+FINE = 1e-2  # numerics: of the logarithm of a time constant
 
 
 _CONFIG, _DRIFT = SlidingConfig(), DriftConfig()
@@ -101,7 +101,8 @@ def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint) -> Sliding:
 def _noise(columns: Array, y: Array) -> float:
     """Return the median square that least squares leaves by degree of freedom [N² m²]."""
     used = np.any(columns != 0.0, axis=0).sum() / len(y)
-    return float(np.median(np.square(_Fit(columns, y).residual)) / max(1.0 - used, 1.0 / len(y)))
+    square = np.square(_fitted(columns, y).residual)
+    return float(np.median(square) / max(1.0 - used, 1.0 / len(y)))
 
 
 def _follows(columns: Array, rigid: int, y: Array, more: Mask, noise: float) -> bool:
@@ -112,7 +113,7 @@ def _follows(columns: Array, rigid: int, y: Array, more: Mask, noise: float) -> 
         noise: [N² m²] median square of the rows with the longest travel. It stays: rows that fit a
             little worse, taken in, would let in what fits worse again.
     """
-    fit = _Fit(columns, y)
+    fit = _fitted(columns, y)
     friction = np.square(columns[:, rigid:] @ fit.beta[rigid:])
     most = max(_CONFIG.worse * noise, _CONFIG.good**2 * float(np.median(friction)))
     return float(np.median(np.square(fit.residual[more]))) <= most
@@ -123,7 +124,7 @@ def _late_friction(columns: Array, y: Array, speed: Array, rows: Mask) -> Array:
 
     The columns (all rows, 2) are zero before it.
     """
-    row = _step_row(np.sign(speed[rows]), _Fit(columns[rows], y[rows]))
+    row = _step_row(np.sign(speed[rows]), _fitted(columns[rows], y[rows]))
     first = np.flatnonzero(rows)[row]
     late = np.arange(len(y))[:, None] >= first
     return np.where(late, np.stack([np.sign(speed), speed], axis=1), 0.0)
@@ -175,35 +176,15 @@ def _free_course(speed: Array) -> Array:
     return np.hstack([hats * np.sign(speed)[:, None], hats * speed[:, None]])
 
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """Least squares of y (rows,) over columns (rows, columns) of which some may be one."""
-
-    columns: Array
-    y: Array
-
-    @cached_property
-    def basis(self) -> Array:
-        """Return orthonormal columns of the same space."""
-        scale = np.linalg.norm(self.columns, axis=0)
-        unit = self.columns[:, scale > 0.0] / scale[scale > 0.0]
-        left, size, _ = np.linalg.svd(unit, full_matrices=False)
-        return np.asarray(left[:, size > RANK * size.max(initial=0.0)])
-
-    @cached_property
-    def beta(self) -> Array:
-        """Return the coefficients (columns,)."""
-        scale = np.linalg.norm(self.columns, axis=0)
-        scale = np.where(scale > 0.0, scale, 1.0)
-        return np.asarray(np.linalg.lstsq(self.columns / scale, self.y, rcond=RANK)[0] / scale)
-
-    @cached_property
-    def residual(self) -> Array:
-        return self.outside(self.y)
-
-    def outside(self, column: Array) -> Array:
-        """Return what of a column (rows,) lies outside."""
-        return np.asarray(column - self.basis @ (self.basis.T @ column))
+def _fitted(columns: Array, y: Array) -> Linear:
+    """Fit y (rows,) by columns (rows, columns) of which some may be one."""
+    scale = np.linalg.norm(columns, axis=0)
+    scale = np.where(scale > 0.0, scale, 1.0)
+    left, size, right = np.linalg.svd(columns / scale, full_matrices=False)
+    kept = size > RANK * size.max(initial=0.0)
+    basis, root = left[:, kept], right[kept].T / size[kept] / scale[:, None]
+    projected = basis.T @ y
+    return Linear(columns, root @ projected, y - basis @ projected, root)
 
 
 def _attenuation(stretches: Sequence[Stretch], columns: Array, slides: Mask,
@@ -217,7 +198,7 @@ def _attenuation(stretches: Sequence[Stretch], columns: Array, slides: Mask,
     width, shares = stretches[0].rigid.shape[1], []
     for k in range(postures):
         own, others = columns[:, width * k], np.delete(columns, width * k, axis=1)
-        outside = _Fit(others, own).residual
+        outside = _fitted(others, own).residual
         shares.append(float(noise[own != 0.0].sum()) / max(float(outside @ outside), 1e-300))
     return max(shares)
 
@@ -229,7 +210,8 @@ class _Rows:
     stretches: Sequence[Stretch]
     speed: Array  # (rows,) [rad/s]
     curve: Array  # (rows, columns) of a free curve of friction
-    steady: _Fit  # without a drift; the last columns are those of the curve
+    steady: Linear  # without a drift; the last columns are those of the curve
+    y: Array  # (rows,) [N m]
     blocks: npt.NDArray[np.intp]  # (rows,) of time
 
     def along(self, course: Course) -> Array:
@@ -237,9 +219,9 @@ class _Rows:
         return np.concatenate([course.at(part, stretch.middle[2] - stretch.t[0])
                                for part, stretch in enumerate(self.stretches)])
 
-    def held_out(self, fit: _Fit) -> Array:
+    def held_out(self, fit: Linear) -> Array:
         """Return Σ r² of every block as the other blocks predict it (blocks,)."""
-        rest = held_out(fit.basis, fit.residual, self.blocks)
+        rest = held_out(fit.columns @ fit.root, fit.residual, self.blocks)
         return np.asarray(np.maximum(np.bincount(self.blocks, np.square(rest)), 1e-300))
 
 
@@ -248,7 +230,7 @@ class _Drift:
     """The best course of one kind and form."""
 
     course: Course
-    fit: _Fit  # the last column is c(t) g(v)
+    fit: Linear  # the last column is c(t) g(v)
     typical: float  # [N m] median of |g(v)|
 
     @property
@@ -273,9 +255,9 @@ def drift_of(stretches: Sequence[Stretch], joint: OneJoint) -> Course | None:
     speed = np.concatenate([stretch.middle[1] for stretch in stretches])
     curve = _free_curve(speed)
     rows = _Rows(stretches, speed, curve,
-                 _Fit(np.hstack([equations.fixed, curve]), equations.y),
+                 _fitted(np.hstack([equations.fixed, curve]), equations.y), equations.y,
                  blocks_of_time(stretches, _DRIFT.block))
-    few = len(speed) < _DRIFT.rows * rows.steady.basis.shape[1]
+    few = len(speed) < _DRIFT.rows * rows.steady.root.shape[1]
     if few or rows.blocks.max() + 1 < _DRIFT.fewest:
         return None
     drifts = [_best(kind, form, rows) for form in ("whole", "coulomb", "viscous")
@@ -304,13 +286,13 @@ def _best(kind: str, form: str, rows: _Rows) -> _Drift:
             shape = rows.curve @ fit.beta[last - width:last]
         course = (_step if kind == "step" else _trend)(form, shape, rows)
         own = rows.along(course) * shape
-        fit = _Fit(np.column_stack([rows.steady.columns, own]), fit.y)
+        fit = _fitted(np.column_stack([rows.steady.columns, own]), rows.y)
     return _Drift(course, fit, float(np.median(np.abs(shape))))
 
 
 def _deviation(drift: _Drift, rows: _Rows) -> float:
     """Return the std of the size of a drift [N m], errors in a block dependent (White 1984)."""
-    outside = rows.steady.outside(drift.fit.columns[:, -1])
+    outside = rows.steady.beside(drift.fit.columns[:, -1])
     sums = np.bincount(rows.blocks, outside * drift.fit.residual)
     return drift.typical * float(np.linalg.norm(sums)) / max(float(outside @ outside), 1e-300)
 
@@ -324,7 +306,7 @@ def _trend(form: str, shape: Array, rows: _Rows) -> Course:
         return Course("trend", form, time, 0.5 * duration, duration)
 
     def loss(logarithm: float) -> float:
-        outside = rows.steady.outside(rows.along(course(logarithm)) * shape)
+        outside = rows.steady.beside(rows.along(course(logarithm)) * shape)
         gain = np.square(outside @ rows.steady.residual)
         return -float(gain / max(float(outside @ outside), 1e-300))
 
@@ -345,16 +327,17 @@ def _step(form: str, shape: Array, rows: _Rows) -> Course:
     return Course("step", form, when, 0.0, when, here)
 
 
-def _step_row(shape: Array, fit: _Fit) -> int:
+def _step_row(shape: Array, fit: Linear) -> int:
     """Return the row from which on `shape` (rows,) lowers Σ r² of `fit` most (Andrews 1993, sup F).
 
     Its products with other columns are sums over the later rows. A step that lies within the other
     columns, but for less than a row, is not shown by any.
     """
-    products = shape[:, None] * np.column_stack([fit.residual, shape, fit.basis])
+    products = shape[:, None] * np.column_stack([fit.residual, shape, fit.columns @ fit.root])
     after, count = np.cumsum(products[::-1], axis=0)[::-1], len(shape)
     outside = after[:, 1] - np.square(after[:, 2:]).sum(axis=1)
     shown = outside > after[0, 1] / count
     gain = np.where(shown, np.square(after[:, 0]) / np.where(shown, outside, 1.0), 0.0)
     rows = np.arange(max(1, int(_DRIFT.ends * count)), int((1.0 - _DRIFT.ends) * count))
-    return int(rows[np.argmax(gain[rows])])
+    # of rows that are alike but for rounding the first
+    return int(rows[np.argmax(gain[rows] > (1.0 - ALIKE) * gain[rows].max())])
