@@ -45,7 +45,8 @@ class _Run:
 
 def _runs_of(log: LogEquations, j: int) -> list[_Run]:
     """Return the runs of `log`, their rows found by the times that its equations have."""
-    times, motion, runs = log.times(), log.found.motion, []
+    motion, runs = log.found.motion, []
+    times = motion.t[log.moments()]
     for run in log.runs:
         rows = log.found.good.kept[run]
         t = motion.t[rows]

@@ -17,7 +17,7 @@ trend 1 - exp(-(t - t0)/T) that begins anew in every log, as a joint warms up, o
 instant. Both are tried on rows that slide, with the same free curve: what a curve can hold is no
 drift. The course that leaves least must predict blocks of time that were held out better than no
 change does: logarithms of the ratio of their squared errors, in closed form by leverage, against
-draws of their signs (fit/flips.py).
+draws of their signs (estimation/bootstrap.py).
 """
 
 from __future__ import annotations
