@@ -226,4 +226,3 @@ class LinksConfig:
     thin: float = 1e-3  # of a ball's second moment, that a point or a rod is given
     relative: float = 1e-3  # std of a base parameter without one, of the largest
     inside: float = 0.1  # of the distance to what exists, to be inside of it
-    seed: int = 1  # of the states at which base parameters are compared

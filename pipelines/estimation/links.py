@@ -24,7 +24,7 @@ import numpy as np
 
 from pipelines.dynamics.altered import chain_of
 from pipelines.dynamics.body import Array, RigidBody
-from pipelines.dynamics.chain import STANDARD, regressor
+from pipelines.dynamics.chain import STANDARD
 from pipelines.dynamics.kinematics import SerialChain
 from pipelines.estimation.config import LinksConfig
 from pipelines.estimation.consistency import physical_consistency, pseudo_inertia
@@ -105,19 +105,6 @@ def prior_links(robot: RobotDescription) -> tuple[Array, tuple[str, ...], tuple[
     return np.array(found), tuple(assumed), tuple(impossible)
 
 
-def base_of_standard(body: RigidBody) -> Array:
-    """Return B (parameters, 10 joints) with p = B φ, found on random states."""
-    n, rng = body.robot.n_joints, np.random.default_rng(_CONFIG.seed)
-    states = [rng.normal(size=(20 * n, n)) for _ in range(3)]
-    ours = body.regressor(*states)
-    ours = ours.reshape(-1, ours.shape[2])
-    scale = np.linalg.norm(ours, axis=0)
-    theirs = regressor(chain_of(body), states[0], states[1], states[2]).reshape(len(ours), -1)
-    found = np.linalg.lstsq(ours / scale, theirs, rcond=None)[0] / scale[:, None]
-    found[np.abs(found) < 1e-12 * np.abs(found).max()] = 0.0
-    return np.asarray(found)
-
-
 def consistent_links(body: RigidBody, p: Array, covariance: Array) -> Links:
     """Return links that could exist and have the base parameters `p`, or the nearest to them.
 
@@ -127,7 +114,7 @@ def consistent_links(body: RigidBody, p: Array, covariance: Array) -> Links:
     """
     prior, assumed, _ = prior_links(body.robot)
     moved = _onto_axes(chain_of(body))
-    base = base_of_standard(body) @ np.linalg.inv(moved)
+    base = body.combine @ np.linalg.inv(moved)
     prior = pseudo_inertia((moved @ _standard(prior)).reshape(-1, 10))
     variance = np.diag(covariance)
     usual = _CONFIG.relative * max(float(np.abs(p).max()), 1e-9)

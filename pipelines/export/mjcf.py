@@ -16,6 +16,7 @@ import math
 from collections.abc import Mapping
 from functools import partial
 from importlib.util import find_spec
+from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
@@ -137,21 +138,16 @@ def _load(texts: Mapping[str, str], held: Held, motion: Motion) -> Loaded | None
         return None
     import mujoco
 
-    (text,) = texts.values()
-    model = mujoco.MjModel.from_xml_string(text)
+    model, data, positions, speeds, drives = _opened(texts, held)
     off = mujoco.mjtDisableBit
     model.opt.disableflags |= int(off.mjDSBL_FRICTIONLOSS) | int(off.mjDSBL_LIMIT)
-    data, tau = mujoco.MjData(model), np.zeros(motion.q.shape)
-    joints = [model.joint(joint.name) for joint in held.joints]
-    positions, speeds = ([int(getattr(j, k)[0]) for j in joints] for k in ("qposadr", "dofadr"))
+    tau = np.zeros(motion.q.shape)
     for row, (q, v, a) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
         data.qpos[positions], data.qvel[speeds], data.qacc[speeds] = q, v, a
         mujoco.mj_inverse(model, data)
         tau[row] = data.qfrc_inverse[speeds]
     tau += model.dof_frictionloss[speeds] * np.sign(motion.dq)
-    drives = [model.actuator(f"{joint.name}_drive") for joint in held.joints]
-    tau -= np.array([drive.biasprm[0] for drive in drives])
-    tau /= np.array([drive.gainprm[0] for drive in drives])
+    tau = (tau - model.actuator_biasprm[drives, 0]) / model.actuator_gainprm[drives, 0]
     return Loaded(f"MuJoCo {mujoco.__version__}", tau)
 
 
@@ -166,13 +162,8 @@ def _simulate(
         return None
     import mujoco
 
-    (text,) = texts.values()
-    model = mujoco.MjModel.from_xml_string(text)
-    model.opt.timestep = motion.sample_time
-    data, q = mujoco.MjData(model), np.full_like(motion.q, np.nan)
-    joints = [model.joint(joint.name) for joint in held.joints]
-    positions, speeds = ([int(getattr(j, k)[0]) for j in joints] for k in ("qposadr", "dofadr"))
-    drives = [model.actuator(f"{joint.name}_drive").id for joint in held.joints]
+    model, data, positions, speeds, drives = _opened(texts, held)
+    model.opt.timestep, q = motion.sample_time, np.full_like(motion.q, np.nan)
     for first in windows.first:
         mujoco.mj_resetData(model, data)
         data.qpos[positions], data.qvel[speeds] = motion.q[first], motion.dq[first]
@@ -184,3 +175,14 @@ def _simulate(
             data.ctrl[drives] = tau[k]
             mujoco.mj_step(model, data)
     return q
+
+
+def _opened(texts: Mapping[str, str], held: Held) -> tuple[Any, ...]:
+    """Return model and data, and the places of positions, speeds and drives, joint by joint."""
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string(*texts.values())
+    joints = [model.joint(joint.name) for joint in held.joints]
+    positions, speeds = ([int(getattr(j, k)[0]) for j in joints] for k in ("qposadr", "dofadr"))
+    drives = [model.actuator(f"{joint.name}_drive").id for joint in held.joints]
+    return model, mujoco.MjData(model), positions, speeds, drives

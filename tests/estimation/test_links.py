@@ -11,7 +11,7 @@ import pytest
 
 from pipelines.dynamics.arm import Arm
 from pipelines.estimation.consistency import physical_consistency, pseudo_inertia
-from pipelines.estimation.links import base_of_standard, consistent_links, prior_links
+from pipelines.estimation.links import consistent_links, prior_links
 from pipelines.io.robot import Joint, LinkParameters, RobotDescription
 from pipelines.io.robot_files import load_robot
 from pipelines.io.urdf import import_urdf
@@ -91,10 +91,10 @@ def test_a_link_that_would_need_negative_mass_is_named() -> None:
     phi = np.array([v for j in arm.robot.joints for v in (
         j.link.mass, *(j.link.mass * c for c in j.link.com), *j.link.inertia)])
     phi[24:27] *= 0.2  # the elbow's moments: far too small for its mass and centre
-    p = base_of_standard(arm.body) @ phi
+    p = arm.body.combine @ phi
     covariance = np.diag((0.02 * np.abs(p) + 1e-3) ** 2)
     links = consistent_links(arm.body, p, covariance)
-    known = physical_consistency(p, covariance, base_of_standard(arm.body))
+    known = physical_consistency(p, covariance, arm.body.combine)
     assert not links.exact
     assert links.conflicts == ("elbow",)
     assert known.distance <= links.distance <= 1.1 * known.distance

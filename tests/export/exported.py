@@ -11,7 +11,7 @@ from pipelines.dynamics.body import Motion
 from pipelines.dynamics.parameter import Parameter
 from pipelines.dynamics.rrr import rigid_body
 from pipelines.effects import find_effect
-from pipelines.estimation.links import Links, base_of_standard, consistent_links
+from pipelines.estimation.links import Links, consistent_links
 from pipelines.export.states import course
 from pipelines.export.target import Held, Target, folded, held_by
 from pipelines.export_model import TARGETS
@@ -21,7 +21,7 @@ from pipelines.io.robot import RobotDescription
 def arm_of(robot: RobotDescription, phi: np.ndarray) -> Arm:
     """The rigid arm of standard parameters phi (10 joints,)."""
     body = rigid_body(robot)
-    p = base_of_standard(body) @ phi
+    p = body.combine @ phi
     named = zip(body.parameters, p, strict=True)
     return Arm(robot.name, body, tuple(Parameter(k.name, float(v), None, k.unit) for k, v in named))
 
