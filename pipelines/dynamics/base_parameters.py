@@ -19,7 +19,7 @@ import numpy as np
 from pipelines.dynamics import chain as serial
 from pipelines.dynamics.body import (
     BaseParameter,
-    TorqueParts,
+    RigidBody,
     refuse_other_length,
     refuse_other_shapes,
 )
@@ -139,7 +139,7 @@ def _combination(leading: int, row: Array) -> str:
     return " ".join(words)
 
 
-class BaseArm:
+class BaseArm(RigidBody):
     """Any serial arm in its base parameters: the general counterpart of the closed form.
 
     `chain` replaces that of the description, for an arm that is not as described.
@@ -150,7 +150,10 @@ class BaseArm:
         self.chain = chain or serial_chain(robot)
         self.base = base_set(self.chain, np.random.default_rng(_SEED))
         self.parameters = self.base.parameters
-        self.combine = self.base.combine
+
+    @property
+    def combine(self) -> Array:
+        return self.base.combine
 
     @cached_property
     def links_behind(self) -> Array:
@@ -166,27 +169,13 @@ class BaseArm:
         return serial.regressor(self.chain, q, dq, ddq, self.base.chosen)
 
     def standard(self, p: Array) -> Array:
-        """Return standard parameters (joints * 10,) with the torques of p.
-
-        Everything not in the base set is zero.
-        """
-        phi = np.zeros(10 * self.chain.n_joints)
-        phi[list(self.base.chosen)] = p
-        return phi
+        """Return standard parameters (joints * 10,) with the torques of p, else zero."""
+        return np.asarray(self.links_behind @ p)
 
     def torque(self, q: Array, dq: Array, ddq: Array, p: Array) -> Array:
         """τ = Y p (samples, joints) [N m], by the recursion, without forming Y."""
         self._check(p, q=q, dq=dq, ddq=ddq)
         return serial.inverse_dynamics(self.chain, q, dq, ddq, self.standard(p))
-
-    def torque_parts(self, q: Array, dq: Array, ddq: Array, p: Array) -> TorqueParts:
-        """Inertial, Coriolis and gravity torque."""
-        self._check(p, q=q, dq=dq, ddq=ddq)
-        phi, rest, weightless = self.standard(p), np.zeros_like(q), np.zeros(3)
-        return TorqueParts(
-            inertia=serial.inverse_dynamics(self.chain, q, rest, ddq, phi, weightless),
-            coriolis=serial.inverse_dynamics(self.chain, q, dq, rest, phi, weightless),
-            gravity=serial.inverse_dynamics(self.chain, q, rest, rest, phi))
 
     def mass_matrix(self, q: Array, p: Array) -> Array:
         """D(q) (samples, joints, joints) [kg m^2]."""
@@ -202,13 +191,3 @@ class BaseArm:
         refuse_other_shapes(self.chain.n_joints, **states)
         if p is not None:
             refuse_other_length(len(self.parameters), p)
-
-    def known_parameters(self) -> Array | None:
-        """Return p (parameters,) of the links that the description knows.
-
-        Returns None where it does not know them all.
-        """
-        links = [joint.link for joint in self.robot.joints if joint.link is not None]
-        if len(links) < self.robot.n_joints:
-            return None
-        return self.base.combine @ serial.standard_parameters(links)

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.io.robot import RobotDescription
+from pipelines.io.robot import LinkParameters, RobotDescription
 
 __all__ = [
     "Array", "BaseParameter", "Motion", "RigidBody", "TorqueParts", "refuse_other_length",
-    "refuse_other_shapes"
+    "refuse_other_shapes", "standard_parameters",
 ]
 
 Array = npt.NDArray[np.float64]
@@ -115,48 +116,58 @@ def refuse_other_length(parameters: int, p: Array) -> None:
         raise ValueError(f"p has the shape {np.shape(p)}, wanted is ({parameters},)")
 
 
-class RigidBody(Protocol):
+class RigidBody(ABC):
     """A rigid arm whose torque is linear in its base parameters: τ = Y(q, dq, ddq) p, eq. (8)."""
 
     robot: RobotDescription
     parameters: tuple[BaseParameter, ...]
 
     @property
+    @abstractmethod
     def combine(self) -> Array:
         """(parameters, 10 · joints): p of standard parameters, not to be written to."""
-        ...
 
     @property
+    @abstractmethod
     def links_behind(self) -> Array:
-        """(10 · joints, parameters).
+        """(10 · joints, parameters): standard parameters with the torques of p, the same."""
 
-        Standard parameters that have the torques of p, not to be written to.
-        """
-        ...
-
+    @abstractmethod
     def regressor(self, q: Array, dq: Array, ddq: Array) -> Array:
-        """Y (samples, joints, parameters) for q, dq, ddq (samples, joints)."""
-        ...
+        """Y (samples, joints, parameters), stored with samples fastest."""
 
+    @abstractmethod
     def torque(self, q: Array, dq: Array, ddq: Array, p: Array) -> Array:
         """τ = Y p (samples, joints) [N m], without forming Y where that is faster."""
-        ...
 
-    def torque_parts(self, q: Array, dq: Array, ddq: Array, p: Array) -> TorqueParts:
-        """Inertial, Coriolis and gravity torque."""
-        ...
-
-    def mass_matrix(self, q: Array, p: Array) -> Array:
-        """D(q) (samples, joints, joints) [kg m^2]."""
-        ...
-
+    @abstractmethod
     def tip(self, q: Array) -> Array:
         """Tip position (samples, 3) [m] in the base frame."""
-        ...
+
+    def torque_parts(self, q: Array, dq: Array, ddq: Array, p: Array) -> TorqueParts:
+        """D(q) ddq, c(q, dq) and h(q): what is left of τ with the others at rest."""
+        rest = np.zeros_like(q)
+        gravity = self.torque(q, rest, rest, p)
+        return TorqueParts(self.torque(q, rest, ddq, p) - gravity,
+                           self.torque(q, dq, rest, p) - gravity, gravity)
+
+    def mass_matrix(self, q: Array, p: Array) -> Array:
+        """D(q) (samples, joints, joints) [kg m^2]: what unit accelerations take."""
+        rest = np.zeros_like(q)
+        gravity = self.torque(q, rest, rest, p)
+        units = np.eye(self.robot.n_joints)
+        return np.stack([self.torque(q, rest, rest + unit, p) - gravity for unit in units], axis=-1)
 
     def known_parameters(self) -> Array | None:
-        """Return p (parameters,) of the links that the description knows.
+        """Return p of the links of the description; None where it does not know them all."""
+        links = [joint.link for joint in self.robot.joints if joint.link is not None]
+        if len(links) < self.robot.n_joints:
+            return None
+        terms = self.combine * standard_parameters(links)
+        return np.array([math.fsum(row) for row in terms])  # to the last bit on any processor
 
-        Returns None where it does not know them all.
-        """
-        ...
+
+def standard_parameters(links: Sequence[LinkParameters]) -> Array:
+    """Return the standard parameters (links * 10,) of known links."""
+    return np.array([v for k in links for v in (k.mass, *(k.mass * c for c in k.com), *k.inertia)],
+                    dtype=float)

@@ -27,20 +27,12 @@ from pipelines.dynamics.kinematics import (
     walking_memory,
 )
 from pipelines.io.log import Array
-from pipelines.io.robot import LinkParameters
 
-__all__ = ["STANDARD", "inverse_dynamics", "mass_matrix", "regressor", "spatial_inertia",
-           "standard_parameters"]
+__all__ = ["STANDARD", "inverse_dynamics", "mass_matrix", "regressor", "spatial_inertia"]
 
 STANDARD = ("m", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
 # Fewer samples at once cost more in calls, more no longer gain.
 _AT_ONCE = 8192  # numerics: samples worked on at once at most
-
-
-def standard_parameters(links: Sequence[LinkParameters]) -> Array:
-    """Return the standard parameters (links * 10,) of known links."""
-    return np.array([v for k in links for v in (k.mass, *(k.mass * c for c in k.com), *k.inertia)],
-                    dtype=float)
 
 
 def regressor(chain: SerialChain, q: Array, dq: Array, ddq: Array,

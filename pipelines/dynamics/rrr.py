@@ -19,11 +19,10 @@ from pipelines.dynamics.base_parameters import BaseArm
 from pipelines.dynamics.body import (
     BaseParameter,
     RigidBody,
-    TorqueParts,
     refuse_other_length,
     refuse_other_shapes,
 )
-from pipelines.dynamics.chain import STANDARD, standard_parameters
+from pipelines.dynamics.chain import STANDARD
 from pipelines.io.log import Array
 from pipelines.io.robot import RobotDescription
 
@@ -72,7 +71,7 @@ def fits(robot: RobotDescription) -> bool:
                for value in zeros) and min(two.a, three.a, -robot.gravity[2]) > _TINY
 
 
-class RRR:
+class RRR(RigidBody):
     """The RRR arm: τ = R(q, dq, ddq) p with the 15 elements of (A4)."""
 
     def __init__(self, robot: RobotDescription) -> None:
@@ -197,28 +196,6 @@ class RRR:
         """τ = R p (samples, 3) [N m]."""
         refuse_other_length(15, p)
         return np.asarray(self.regressor(q, dq, ddq) @ p)
-
-    def torque_parts(self, q: Array, dq: Array, ddq: Array, p: Array) -> TorqueParts:
-        """D(q) ddq, c(q, dq) and h(q): what is left of τ with the others at rest."""
-        rest = np.zeros_like(q)
-        gravity = self.torque(q, rest, rest, p)
-        return TorqueParts(self.torque(q, rest, ddq, p) - gravity,
-                           self.torque(q, dq, rest, p) - gravity, gravity)
-
-    def mass_matrix(self, q: Array, p: Array) -> Array:
-        """D(q) (samples, 3, 3) [kg m^2]: what unit accelerations take."""
-        rest = np.zeros_like(q)
-        gravity = self.torque(q, rest, rest, p)
-        columns = [self.torque(q, rest, rest + unit, p) - gravity for unit in np.eye(3)]
-        return np.stack(columns, axis=-1)
-
-    def known_parameters(self) -> Array | None:
-        """Return p (15,) of the links of the description; None where it does not know them all."""
-        links = [joint.link for joint in self.robot.joints if joint.link is not None]
-        if len(links) < self.robot.n_joints:
-            return None
-        terms = self.combine * standard_parameters(links)
-        return np.array([math.fsum(row) for row in terms])  # to the last bit on any processor
 
     def _trigonometry(self, q2: Array, q3: Array) -> tuple[Array, ...]:
         """cos and sin of q2, q3 and S.

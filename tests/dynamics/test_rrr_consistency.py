@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.dynamics.chain import standard_parameters
+from pipelines.dynamics.body import standard_parameters
 from pipelines.dynamics.consistency import rrr_inequalities
 from pipelines.dynamics.rrr import RRR, combined
 from pipelines.estimation.consistency import physical_consistency

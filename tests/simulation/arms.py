@@ -63,7 +63,7 @@ def serial(name: str, shared: Path, folder: Path, seed: int = 3) -> Case:
 
 
 def _known(arm: Arm) -> Array:
-    from pipelines.dynamics.chain import standard_parameters
+    from pipelines.dynamics.body import standard_parameters
 
     return standard_parameters([joint.link for joint in arm.robot.joints if joint.link is not None])
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.dynamics.chain import standard_parameters
+from pipelines.dynamics.body import standard_parameters
 from pipelines.estimation.checks.channel_order import SIGNALS, ColumnOrder, search_orders
 from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.estimation.checks.gravity_fit import LOOSE, GravityFit, GravityModel
