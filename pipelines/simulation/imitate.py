@@ -49,26 +49,25 @@ class How:
         Raises:
             UsageError: C02.
         """
+        def need(fits: bool, option: str, words: str, remedy: str) -> None:
+            if not fits:
+                raise UsageError("C02", words, where=option, remedy=remedy)
+
         longest, most = SIMULATION.window_longest, SIMULATION.most
-        wrong = (
-            (bool(self.noise) and len(self.noise) not in (1, n_joints), "--noise",
-             f"{len(self.noise)} noise levels for {n_joints} joints", "give one, or one a joint"),
-            (any(not 0.0 <= level < np.inf for level in self.noise), "--noise",
-             "a noise level below zero", "give standard deviations in N m"),
-            (not 1 <= self.replicas <= most, "--replicas", f"{self.replicas} replicas",
-             f"give 1 to {most}"),
-            (self.seed < 0, "--seed", f"seed {self.seed}", "give 0 or more"),
-            (self.steps is not None and not 1 <= self.steps <= most, "--steps",
-             f"{self.steps} steps a sample", f"give 1 to {most}"),
-            (not 0.0 < self.window <= longest, "--window", f"windows of {self.window:g} s",
-             f"give up to {longest:g} s"),
-            (self.replicas > 1 and not any(self.noise), "--replicas",
+        need(len(self.noise) in (0, 1, n_joints), "--noise",
+             f"{len(self.noise)} noise levels for {n_joints} joints", "give one, or one a joint")
+        need(all(0.0 <= level < np.inf for level in self.noise), "--noise",
+             "a noise level below zero", "give standard deviations in N m")
+        need(1 <= self.replicas <= most, "--replicas", f"{self.replicas} replicas",
+             f"give 1 to {most}")
+        need(self.seed >= 0, "--seed", f"seed {self.seed}", "give 0 or more")
+        need(self.steps is None or 1 <= self.steps <= most, "--steps",
+             f"{self.steps} steps a sample", f"give 1 to {most}")
+        need(0.0 < self.window <= longest, "--window", f"windows of {self.window:g} s",
+             f"give up to {longest:g} s")
+        need(self.replicas == 1 or any(self.noise), "--replicas",
              f"{self.replicas} replicas without noise are all the same",
-             "say how large the drives' noise is, with --noise"),
-        )
-        for fails, where, words, remedy in wrong:
-            if fails:
-                raise UsageError("C02", words, where=where, remedy=remedy)
+             "say how large the drives' noise is, with --noise")
 
 
 @dataclass(frozen=True)
@@ -108,10 +107,11 @@ class Imitation:
         return cls(log.name, log.source, (), simulation, reason, law, log.n_samples, 1, q, tau,
                    None, None, None, None, None, steps, None, None, None, ())
 
-    def compared(self, q: Array, dq: Array, tau: Array | None) -> Imitation:
+    def compared(self, q: Array, dq: Array, tau: Array | None, drawn: Course | None) -> Imitation:
         """Return it with what is off in position, speed and torque, (replicas, samples, joints)."""
         return replace(self, position_rms=_rms(q), position_max=np.nanmax(np.abs(q), axis=(0, 1)),
-                       speed_rms=_rms(dq), torque_rms=None if tau is None else _rms(tau))
+                       speed_rms=_rms(dq), torque_rms=None if tau is None else _rms(tau),
+                       course=drawn)
 
 
 def imitate(log: ExperimentLog, arm: Arm, how: How, file: str, settings: object = None,
@@ -142,35 +142,27 @@ def imitate(log: ExperimentLog, arm: Arm, how: How, file: str, settings: object 
         if lacking.code != "RRID-S22" or log.origin == "planned":
             raise
         return _in_windows(log, bare, plant, how, lacking.message, draw)
-    done, found = _closed_loop(log, plant, experiment, how)
-    files = tuple(file if k == 0 else f"{file}-{k + 1}" for k in range(how.replicas))
-    logs = tuple(_simulated_log(bare, done, k, settings) for k in range(how.replicas))
-    found = replace(found, files=files, logs=logs, replicas=how.replicas)
-    if log.origin == "planned" or "q" not in log:
-        return found
-    speed = reconstruct(log, Reconstruction()).motion.dq
-    torque = done.tau - log.tau if "tau" in log else None
-    found = found.compared(done.q - log.q, done.true_dq - speed, torque)
-    if not draw:
-        return found
-    pairs = (log.q, done.q[0]), (speed, done.true_dq[0]), (log.tau, done.tau[0])
-    return replace(found, course=course(log, *pairs))
-
-
-def _closed_loop(log: ExperimentLog, plant: Plant, experiment: Experiment,
-                 how: How) -> tuple[Simulated, Imitation]:
-    """Return what the replicas did, and what is known of it without the log's measurements."""
     levels = np.broadcast_to(np.array(how.noise or (0.0,), dtype=np.float64), (log.n_joints,))
     noise, seeds = Noise(levels, np.zeros(log.n_joints)), range(how.seed, how.seed + how.replicas)
+    found = Imitation.of(log, "closed-loop", "", how.steps or 0)
     if how.steps is not None:  # who asks for steps asks for their accuracy: nothing is held
-        done, error = run(plant, experiment, how.steps, noise, seeds), None
+        done = run(plant, experiment, how.steps, noise, seeds)
     else:
         step = choose_step(plant, experiment, noise)
         done = run(plant, experiment, step.per_sample, noise, seeds, step.exact)
-        error = step.error
+        found = replace(found, steps=step.per_sample, step_error=step.error)
+    files = tuple(file if k == 0 else f"{file}-{k + 1}" for k in range(how.replicas))
+    logs = tuple(_simulated_log(bare, done, k, settings) for k in range(how.replicas))
     between = _rms(np.diff(done.true_q, axis=0)) if how.replicas > 1 else None
-    found = Imitation.of(log, "closed-loop", "", done.steps)
-    return done, replace(found, step_error=error, noise_rms=between)
+    found = replace(found, files=files, logs=logs, replicas=how.replicas, noise_rms=between)
+    if log.origin == "planned" or "q" not in log:
+        return found
+    speed, drawn = reconstruct(log, Reconstruction()).motion.dq, None
+    if draw:
+        pairs = (log.q, done.q[0]), (speed, done.true_dq[0]), (log.tau, done.tau[0])
+        drawn = course(log, *pairs)
+    torque = done.tau - log.tau if "tau" in log else None
+    return found.compared(done.q - log.q, done.true_dq - speed, torque, drawn)
 
 
 def _in_windows(log: ExperimentLog, bare: ExperimentLog, plant: Plant, how: How, reason: str,
@@ -179,13 +171,13 @@ def _in_windows(log: ExperimentLog, bare: ExperimentLog, plant: Plant, how: How,
     found = reconstruct(log, Reconstruction())
     usable: npt.NDArray[np.bool_] = np.zeros(log.n_samples, dtype=bool)
     usable[found.good.kept] = found.good.fit
-    motion, tau = found.motion, held_torque(bare)
-    windows = simulate_windows(plant, motion, tau, log.sample_time, length, usable)
-    q, dq = motion.q, motion.dq
+    q, dq = found.motion.q, found.motion.dq
+    windows = simulate_windows(plant, found.motion, held_torque(bare), log.sample_time, length,
+                               usable)
     drawn = course(log, (q, windows.q), (dq, windows.dq), None, windows) if draw else None
     known = Imitation.of(log, "windowed", reason, windows.steps)
-    known = known.compared((windows.q - q)[None], (windows.dq - dq)[None], None)
-    return replace(known, window=length * log.sample_time, course=drawn)
+    known = known.compared((windows.q - q)[None], (windows.dq - dq)[None], None, drawn)
+    return replace(known, window=length * log.sample_time)
 
 
 def _rms(x: Array) -> Array:
