@@ -20,10 +20,10 @@ from pipelines import diagnose
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.errors import RrridError
 from pipelines.estimation.checks.gates import logs_of_roles
+from pipelines.estimation.friction_terms import with_terms_told_apart
 from pipelines.estimation.judgements import Facts, JudgeableConfig, cannot_judge
-from pipelines.model.rows.friction_terms import with_terms_told_apart
-from pipelines.model.rows.prepare import prepare
-from pipelines.model.rows.repeated import facts, nominal_estimate
+from pipelines.estimation.preparation import prepare
+from pipelines.estimation.repeated_states import facts, nominal_estimate
 from pipelines.stage import Request
 
 _TIMES = (0.5, 1.0, 2.0)

@@ -28,11 +28,11 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import Look, diagnose_prepared
 from pipelines.diagnosis.trained import Standing, train
 from pipelines.estimation.estimate import Recipe
+from pipelines.estimation.preparation import Logs, Prepared, prepare
+from pipelines.estimation.rows import Data
 from pipelines.import_log import STAGE, Settings
 from pipelines.io.files import open_log
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.rows.data import Data
-from pipelines.model.rows.prepare import Logs, Prepared, prepare
 from pipelines.stage import Request, run_stage
 
 TX40 = Recipe(cutoff_hz=100.0, decimation=100, min_speed=(0.05, 0.05, 0.05, 0.12, 0.12, 0.12))

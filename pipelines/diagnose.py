@@ -24,10 +24,10 @@ from pipelines.dynamics.named_cause import refuse_unknown
 from pipelines.errors import Check, UsageError
 from pipelines.estimation.checks.gates import examined, logs_of_roles
 from pipelines.estimation.estimate import refuse_strange, refuse_unfit
+from pipelines.estimation.friction_terms import with_terms_told_apart
+from pipelines.estimation.preparation import BLOCKS, Logs, prepare
 from pipelines.io.model_file import read_model
 from pipelines.io.option import option
-from pipelines.model.rows.friction_terms import with_terms_told_apart
-from pipelines.model.rows.prepare import BLOCKS, Logs, prepare
 from pipelines.report.diagnosis_report import diagnosis_report
 from pipelines.report.finding_words import summary_of
 from pipelines.report.report import Report

@@ -28,17 +28,17 @@ from pipelines.dynamics.named_cause import refuse_unknown, wanted_cause
 from pipelines.effects import find_effect
 from pipelines.effects.base import Effect
 from pipelines.errors import NothingMatched, UsageError
+from pipelines.estimation.candidate_columns import Wanted, place_of
 from pipelines.estimation.checks.gates import examined, logs_of_roles
 from pipelines.estimation.estimate import refuse_strange, refuse_unfit
+from pipelines.estimation.friction_terms import with_terms_told_apart
 from pipelines.estimation.motion import Motions, Reconstructed
+from pipelines.estimation.preparation import BLOCKS, prepare
 from pipelines.estimation.result import torques, validity
 from pipelines.io.files import write_log
 from pipelines.io.log import ExperimentLog, derive, digest_of, recording
 from pipelines.io.model_file import Source, read_model, write_model
 from pipelines.io.option import option
-from pipelines.model.rows.families import Wanted, place_of
-from pipelines.model.rows.friction_terms import with_terms_told_apart
-from pipelines.model.rows.prepare import BLOCKS, prepare
 from pipelines.report.diagnosis_report import extension_report
 from pipelines.report.report import Report
 from pipelines.report.words import fewer_words

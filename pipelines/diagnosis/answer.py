@@ -21,10 +21,10 @@ from pipelines.diagnosis.selection import Cause
 from pipelines.diagnosis.standing import standing_of
 from pipelines.diagnosis.trained import train
 from pipelines.diagnosis.unnamed import Key
-from pipelines.model.rows.families import place_of
-from pipelines.model.rows.fit import no_better, worse_log
-from pipelines.model.rows.prepare import Prepared
-from pipelines.model.rows.residual_analysis import Evidence, evidence, with_simulation
+from pipelines.estimation.candidate_columns import place_of
+from pipelines.estimation.model_fit import no_better, worse_log
+from pipelines.estimation.preparation import Prepared
+from pipelines.estimation.residual_analysis import Evidence, evidence, with_simulation
 
 __all__ = ["WEAKER", "answer"]
 

@@ -23,8 +23,8 @@ from pipelines.dynamics.body import Motion
 from pipelines.effects import all_effects
 from pipelines.effects.base import Effect, everywhere
 from pipelines.effects.drives import TorqueLag
+from pipelines.estimation.candidate_columns import Family, Laid, families, lay_family, whole_motion
 from pipelines.estimation.joint_table import Array, Indices, Table
-from pipelines.model.rows.families import Family, Laid, families, lay_family, whole_motion
 
 __all__ = ["Dictionary", "Group", "Kind", "laid"]
 

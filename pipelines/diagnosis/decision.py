@@ -22,8 +22,8 @@ from pipelines.dynamics.arm import Arm
 from pipelines.estimation.bootstrap import chi2_bound
 from pipelines.estimation.joint_table import Array, in_rows
 from pipelines.estimation.judgements import cannot_judge, negative_viscous
-from pipelines.model.rows.prepare import Prepared
-from pipelines.model.rows.repeated import Repeated, facts, nominal_estimate
+from pipelines.estimation.preparation import Prepared
+from pipelines.estimation.repeated_states import Repeated, facts, nominal_estimate
 
 __all__ = ["Decision", "decide", "limited_by_estimate"]
 

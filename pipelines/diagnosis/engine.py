@@ -22,10 +22,10 @@ from pipelines.diagnosis.trained import covariance
 from pipelines.diagnosis.variance import settle
 from pipelines.dynamics.arm import Acting
 from pipelines.estimation.bootstrap import wald
+from pipelines.estimation.exact_model import difference
 from pipelines.estimation.joint_table import Array, Table, in_rows
+from pipelines.estimation.preparation import Logs, Prepared, prepare
 from pipelines.io.log import ExperimentLog
-from pipelines.model.rows.exact import difference
-from pipelines.model.rows.prepare import Logs, Prepared, prepare
 
 __all__ = ["Diagnosis", "diagnose", "diagnose_prepared", "pose"]
 

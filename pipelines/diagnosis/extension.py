@@ -25,10 +25,10 @@ from pipelines.diagnosis.standing import standing_of
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.trained import covariance, train
 from pipelines.dynamics.arm import Acting
+from pipelines.estimation.candidate_columns import Wanted, usable
+from pipelines.estimation.model_fit import worse_log
 from pipelines.estimation.nominal import plain_number
-from pipelines.model.rows.families import Wanted, usable
-from pipelines.model.rows.fit import worse_log
-from pipelines.model.rows.prepare import Prepared
+from pipelines.estimation.preparation import Prepared
 
 __all__ = ["extend"]
 

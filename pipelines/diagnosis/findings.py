@@ -30,11 +30,11 @@ from pipelines.diagnosis.selection import Round, laws_of
 from pipelines.diagnosis.state import Fit, State
 from pipelines.diagnosis.trained import Standing, Trained, parameters, told
 from pipelines.dynamics.arm import Acting
+from pipelines.estimation.exact_model import Named
 from pipelines.estimation.joint_table import Array
-from pipelines.model.rows.exact import Named
-from pipelines.model.rows.fit import Refined, TorqueGain, torque_gain_of
-from pipelines.model.rows.prepare import Prepared
-from pipelines.model.rows.residual_analysis import Proof, proof
+from pipelines.estimation.model_fit import Refined, TorqueGain, torque_gain_of
+from pipelines.estimation.preparation import Prepared
+from pipelines.estimation.residual_analysis import Proof, proof
 from pipelines.simulation.comparison import Simulation, simulation_errors
 
 __all__ = ["Worth", "alternatives_of", "extension_of", "findings_of", "gain_of", "weigh"]

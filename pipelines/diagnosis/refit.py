@@ -26,9 +26,9 @@ from pipelines.diagnosis.unnamed import FORM, Key
 from pipelines.effects.base import Effect, FrictionLaw
 from pipelines.effects.config import ORDERS
 from pipelines.estimation.bootstrap import chi2_bound
+from pipelines.estimation.exact_model import Exact, Named
 from pipelines.estimation.joint_table import Array, Arrow, Indices, Table, by_joint, gains, in_rows
-from pipelines.model.rows.data import END
-from pipelines.model.rows.exact import Exact, Named
+from pipelines.estimation.rows import END
 
 __all__ = ["Later"]
 

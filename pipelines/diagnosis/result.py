@@ -12,13 +12,13 @@ from typing import Literal
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.errors import Check
 from pipelines.estimation.checks.boundary import Boundary
+from pipelines.estimation.model_fit import TorqueGain
 from pipelines.estimation.motion import Motions
+from pipelines.estimation.preparation import FewerTerms
+from pipelines.estimation.residual_analysis import Evidence, Proof
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.model_file import ModelFile
 from pipelines.io.results import NOT_STORED
-from pipelines.model.rows.fit import TorqueGain
-from pipelines.model.rows.prepare import FewerTerms
-from pipelines.model.rows.residual_analysis import Evidence, Proof
 from pipelines.simulation.comparison import SimulatedSpan
 
 __all__ = [

@@ -23,9 +23,9 @@ from pipelines.diagnosis.unnamed import Key, in_words
 from pipelines.dynamics.arm import Acting
 from pipelines.effects.base import Effect
 from pipelines.effects.friction import Coulomb
+from pipelines.estimation.candidate_columns import first_samples
+from pipelines.estimation.exact_model import Exact, Named
 from pipelines.estimation.joint_table import Array
-from pipelines.model.rows.exact import Exact, Named
-from pipelines.model.rows.families import first_samples
 
 __all__ = ["Cause", "Round", "SearchStart", "Selection", "best_law", "laws_of", "refit", "select"]
 

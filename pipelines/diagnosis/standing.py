@@ -26,8 +26,8 @@ from pipelines.diagnosis.state import State
 from pipelines.diagnosis.trained import Standing, told
 from pipelines.diagnosis.unnamed import FORM, Key
 from pipelines.effects.base import adds
-from pipelines.model.rows.data import Data
-from pipelines.model.rows.fit import acting, refine
+from pipelines.estimation.model_fit import acting, refine
+from pipelines.estimation.rows import Data
 
 __all__ = ["standing_of"]
 

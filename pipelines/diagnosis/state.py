@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from pipelines.diagnosis.prior import Belief
+from pipelines.estimation.exact_model import Exact
 from pipelines.estimation.joint_table import Array, Arrow, Indices, Table
-from pipelines.model.rows.exact import Exact
 
 __all__ = ["Fit", "State"]
 

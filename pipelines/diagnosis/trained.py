@@ -29,12 +29,12 @@ from pipelines.diagnosis.score import confidence_set, log_scores
 from pipelines.diagnosis.state import State
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Motion
+from pipelines.estimation.exact_model import Exact, Named, Which, slopes_of
 from pipelines.estimation.joint_table import Array, Arrow, Table
-from pipelines.model.rows.data import Data
-from pipelines.model.rows.exact import Exact, Named, Which, slopes_of
-from pipelines.model.rows.fit import Refined, acting, with_uncertainty
-from pipelines.model.rows.nominal import rigid_rows
-from pipelines.model.rows.prepare import Prepared
+from pipelines.estimation.model_fit import Refined, acting, with_uncertainty
+from pipelines.estimation.nominal_fit import rigid_rows
+from pipelines.estimation.preparation import Prepared
+from pipelines.estimation.rows import Data
 
 __all__ = ["Standing", "Trained", "covariance", "parameters", "told", "train"]
 

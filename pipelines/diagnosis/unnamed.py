@@ -18,8 +18,8 @@ from numpy.polynomial.legendre import legvander
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset
 from pipelines.dynamics.body import Motion
+from pipelines.estimation.candidate_columns import place_of
 from pipelines.estimation.joint_table import Array
-from pipelines.model.rows.families import place_of
 
 __all__ = ["FORM", "Key", "Make", "Unnamed", "in_words"]
 

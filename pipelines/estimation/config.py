@@ -226,3 +226,62 @@ class LinksConfig:
     thin: float = 1e-3  # of a ball's second moment, that a point or a rod is given
     relative: float = 1e-3  # std of a base parameter without one, of the largest
     inside: float = 0.1  # of the distance to what exists, to be inside of it
+
+
+@dataclass(frozen=True)
+class PreparationConfig:
+    """When a joint is held or stands, and how wide a smoother of reversals is."""
+
+    still: float = 1e-3  # of the joint's largest speed: three decades below, it stands
+    held: float = 0.02  # of its largest speed in all logs, below which a joint is held in a log
+    # Times the bandwidth of a smoother. Over logs of the bench coupled transmission leaves 2.5
+    # floors at 1, 1.2 at 1.8, 1.0 at 2.3, and hardly less at 3.2.
+    wider: float = 2.3
+
+
+@dataclass(frozen=True)
+class TermsConfig:
+    """When the terms of a friction law are distinguished."""
+
+    sure: float = 2.0  # standard deviations
+    vague: float = 1.0  # of the logarithm of a sharpness: it may be three times as large
+    rough: float = 0.3  # of the same, from which on a factor says it
+    wide: float = 10.0  # a factor that is no knowledge
+    worth: float = 0.99  # of the squared error that a plainer law leaves: more is no gain
+    much: float = 0.85  # of the same; at 21 joints with one sigmoid none left less than .89
+    long: float = 0.25  # times the equations of a joint in later logs
+    fast: float = 0.5  # times its speed in them, with which earlier logs judge its friction
+
+
+@dataclass(frozen=True)
+class RepeatedConfig:
+    """When two rows are of one state, and a residual is noise."""
+
+    still: tuple[float, float, float] = (1e-3, 1e-2, 0.1)  # [rad, rad/s, rad/s²] less is noise
+    near: float = 0.1  # of the standard deviation of each coordinate: rows of one state
+    apart: float = 1.0  # [s] in a log, at least: after less, what wanders is where it was
+    above: float = 1.6  # times the noise between rows of one state: a smaller residual is noise
+
+
+@dataclass(frozen=True)
+class ResidualConfig:
+    """Bins, stretches and spectra of a residual analysis."""
+
+    curve_bins: int = 48
+    series: int = 3000  # points of a series
+    segment: int = 512  # rows of a spectrum
+    band: float = 0.8  # of the power that the band holds
+    waves: float = 2.0  # of the lowest order in the range: half the width of the window's line
+    part: float = 0.25  # of a wave of the highest order: angles are counted in parts as wide
+    rare: float = 10.0  # times the mean, that a row counts at most at an angle hardly visited
+    as_much: float = 0.9  # of what a curve over time shows of a cause
+    bins: int = 96  # of a proof
+    most_bins: int = 768  # of a proof: a figure is six inches wide
+    rows: int = 4  # of a bin, at least
+    fewest: int = 2  # of a bin where finer bins show more
+    finer: float = 0.02  # of the predicted power, that twice as many bins have to show
+    chance: float = 4.0  # standard deviations of what they show by chance
+    shown: float = 0.2  # of the predicted power, that its means over a signal have to hold
+    stretch: float = 2.0  # [s] of a proof over time
+    seconds: float = 3.0  # of a simulated log that are shown at most
+    points: int = 1500  # of the same

@@ -133,7 +133,7 @@ def thinned(x: npt.NDArray[Any], response: Array, count: int) -> npt.NDArray[Any
 def fast_length(least: int) -> int:
     """Return the smallest 2^a 3^b 5^c from `least` on: the length of a fast Fourier transform."""
     odd = [3**b * 5**c for b in range(20) for c in range(14)]
-    return min(int(k) << max(0, (-(-least // k) - 1).bit_length()) for k in odd)
+    return min([k * (1 << max(0, (-(-least // k) - 1).bit_length())) for k in odd])
 
 
 def passed_both_ways(frequency: Array, cutoff_hz: float, rate: float, order: int = 4) -> Array:

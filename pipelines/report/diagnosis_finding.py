@@ -13,8 +13,8 @@ import numpy as np
 from pipelines.diagnosis.result import Answer, Finding, Gain, ResidualRms, TipError
 from pipelines.dynamics.parameter_names import numbered
 from pipelines.effects import find_effect
+from pipelines.estimation.residual_analysis import Proof
 from pipelines.io.log import Array
-from pipelines.model.rows.residual_analysis import Proof
 from pipelines.report import style
 from pipelines.report.figures import (
     DASHED,

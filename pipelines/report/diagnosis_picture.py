@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipelines.diagnosis.result import Diagnosis
+from pipelines.estimation.residual_analysis import Curve, Evidence, Spectrum
 from pipelines.io.log import Array
-from pipelines.model.rows.residual_analysis import Curve, Evidence, Spectrum
 from pipelines.report import style
 from pipelines.report.figures import (
     Look,

@@ -18,7 +18,7 @@ from pipelines.diagnosis.result import Result as Diagnosed
 from pipelines.dynamics.parameter_names import Named, named_in, numbered, part_of
 from pipelines.effects import effect_names, find_effect
 from pipelines.estimation.nominal import within
-from pipelines.model.rows.prepare import FewerTerms
+from pipelines.estimation.preparation import FewerTerms
 from pipelines.report.finding_words import other_joint
 from pipelines.report.sentences import capital, sentence
 from pipelines.report.style import (

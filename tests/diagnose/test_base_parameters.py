@@ -7,7 +7,7 @@ import pytest
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import Diagnosis, diagnose, pose
 from pipelines.diagnosis.screening import best_of
-from pipelines.model.rows.prepare import Logs, prepare
+from pipelines.estimation.preparation import Logs, prepare
 from tests.diagnose.sessions import healthy_again, session
 
 

@@ -15,9 +15,9 @@ import pytest
 from pipelines import diagnose, import_log
 from pipelines.diagnosis import engine
 from pipelines.diagnosis.result import Diagnosis
+from pipelines.estimation.preparation import Logs
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.results import encode
-from pipelines.model.rows.prepare import Logs
 from pipelines.report.sections import CARD
 from pipelines.stage import Request, run_stage
 from tests.diagnose.sessions import but, healthy_again, session, written

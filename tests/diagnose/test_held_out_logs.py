@@ -11,8 +11,8 @@ import pytest
 from pipelines.diagnosis.result import Diagnosis
 from pipelines.dynamics.arm import Arm
 from pipelines.estimation.motion import Reconstruction, reconstruct
+from pipelines.estimation.preparation import Logs
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.rows.prepare import Logs
 from tests.diagnose.sessions import but, session
 from tests.diagnosis.asking import answered
 

@@ -21,8 +21,8 @@ from benchmarks.recorded_diagnosis import (
 )
 from pipelines.diagnosis.selection import Selection
 from pipelines.estimation.estimate import Recipe
+from pipelines.estimation.preparation import Logs, prepare
 from pipelines.io.files import open_log
-from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnosis.asking import answered
 
 _FOLDS = 5

@@ -13,8 +13,8 @@ from bench.draw import draw_machine
 from bench.faults.drive import Cogging
 from bench.plant import record
 from pipelines.diagnosis.result import Diagnosis
+from pipelines.estimation.preparation import Logs
 from pipelines.io.log import ExperimentLog
-from pipelines.model.rows.prepare import Logs
 from tests.diagnose.sessions import but
 from tests.diagnosis.asking import answered
 from tests.healthy import with_signal

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pipelines.diagnosis.result import Diagnosis
-from pipelines.model.rows.prepare import Logs
+from pipelines.estimation.preparation import Logs
 from tests.diagnose.sessions import but, session
 from tests.diagnosis.asking import answered
 

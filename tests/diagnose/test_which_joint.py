@@ -11,8 +11,8 @@ from benchmarks.hidden_effects.cases import SealedCase
 from benchmarks.hidden_effects.sessions import record_case
 from pipelines.diagnosis import engine
 from pipelines.diagnosis.result import Diagnosis
+from pipelines.estimation.preparation import Logs
 from pipelines.io.log import ExperimentLog
-from pipelines.model.rows.prepare import Logs
 from tests.diagnose.sessions import but
 from tests.diagnosis.asking import answered
 

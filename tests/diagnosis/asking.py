@@ -12,10 +12,10 @@ from pipelines.diagnosis.extension import extend
 from pipelines.diagnosis.result import Diagnosis as Answer
 from pipelines.diagnosis.result import Extended
 from pipelines.dynamics.arm import Acting, Arm
+from pipelines.estimation.candidate_columns import Wanted
+from pipelines.estimation.friction_terms import with_terms_told_apart
+from pipelines.estimation.preparation import BLOCKS, Logs, Prepared, prepare
 from pipelines.io.log import ExperimentLog
-from pipelines.model.rows.families import Wanted
-from pipelines.model.rows.friction_terms import with_terms_told_apart
-from pipelines.model.rows.prepare import BLOCKS, Logs, Prepared, prepare
 
 __all__ = ["answered", "before", "causes", "diagnosed", "effects", "extended", "prepared_for"]
 

@@ -16,10 +16,10 @@ from bench.plant import record
 from pipelines.diagnosis.findings import gain_of
 from pipelines.dynamics.body import Motion
 from pipelines.estimation.estimate import Recipe
-from pipelines.model.rows.exact import Exact
-from pipelines.model.rows.fit import TorqueGain, no_better, worse_log
-from pipelines.model.rows.nominal import fit_nominal
-from pipelines.model.rows.prepare import Logs, prepare
+from pipelines.estimation.exact_model import Exact
+from pipelines.estimation.model_fit import TorqueGain, no_better, worse_log
+from pipelines.estimation.nominal_fit import fit_nominal
+from pipelines.estimation.preparation import Logs, prepare
 from pipelines.simulation import comparison as gains
 from pipelines.simulation.comparison import Simulation, simulation_errors
 from pipelines.simulation.replay import Windows, simulate_windows

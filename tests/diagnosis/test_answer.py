@@ -15,9 +15,9 @@ from pipelines.diagnosis.extension import extend
 from pipelines.diagnosis.limits import Limits, limits_of
 from pipelines.diagnosis.result import Diagnosis, Extended, Finding
 from pipelines.effects import find_effect
+from pipelines.estimation.candidate_columns import Wanted
+from pipelines.estimation.preparation import Logs, Prepared, prepare
 from pipelines.io.files import open_log
-from pipelines.model.rows.families import Wanted
-from pipelines.model.rows.prepare import Logs, Prepared, prepare
 
 _BLOCKS = 10
 

@@ -11,8 +11,8 @@ from pipelines.diagnosis.dataset import load
 from pipelines.dynamics.body import Motion
 from pipelines.effects.friction import Coulomb
 from pipelines.estimation.estimate import Recipe
+from pipelines.estimation.preparation import Logs, prepare
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnose.sessions import but
 from tests.diagnosis.arms import hidden
 from tests.diagnosis.asking import before, causes, diagnosed, effects

@@ -7,9 +7,9 @@ import pytest
 
 from pipelines.dynamics.body import Motion
 from pipelines.effects import find_effect
+from pipelines.estimation.candidate_columns import Wanted
+from pipelines.estimation.preparation import Logs
 from pipelines.io.log import Array
-from pipelines.model.rows.families import Wanted
-from pipelines.model.rows.prepare import Logs
 from tests.diagnosis.arms import hidden, wave
 from tests.diagnosis.asking import extended
 from tests.model.estimation.experiments import COULOMB

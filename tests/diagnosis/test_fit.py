@@ -12,7 +12,7 @@ from pipelines.diagnosis.engine import Diagnosis, pose
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.trained import covariance
 from pipelines.effects.angle import Cogging
-from pipelines.model.rows.prepare import Logs
+from pipelines.estimation.preparation import Logs
 from tests.diagnosis.arms import hidden, wave
 from tests.diagnosis.asking import causes, diagnosed, prepared_for
 

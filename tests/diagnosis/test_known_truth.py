@@ -11,9 +11,9 @@ import pytest
 from pipelines import diagnose
 from pipelines.dynamics.body import Motion
 from pipelines.effects import find_effect
+from pipelines.estimation.preparation import Logs
 from pipelines.io.files import open_log
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.rows.prepare import Logs
 from pipelines.stage import Request
 from tests.diagnose.sessions import but, session, written
 from tests.diagnosis.arms import arm, hidden, wave

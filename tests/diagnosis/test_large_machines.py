@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from pipelines.effects.friction import QuadraticDrag
+from pipelines.estimation.candidate_columns import Wanted
+from pipelines.estimation.preparation import Logs
 from pipelines.io.log import Array, ExperimentLog, Signal
-from pipelines.model.rows.families import Wanted
-from pipelines.model.rows.prepare import Logs
 from tests.diagnosis.asking import answered, extended
 from tests.diagnosis.slides import SLIDE
 

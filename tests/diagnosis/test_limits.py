@@ -17,8 +17,8 @@ from pipelines.diagnosis.result import DetectionLimit, Diagnosis, Rejected
 from pipelines.dynamics.arm import Acting
 from pipelines.effects import effect_names
 from pipelines.effects.friction import TwoSigmoid
+from pipelines.estimation.preparation import Logs
 from pipelines.io.log import ExperimentLog
-from pipelines.model.rows.prepare import Logs
 from tests.diagnose.sessions import but
 from tests.diagnosis.asking import answered, causes, diagnosed
 

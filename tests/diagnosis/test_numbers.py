@@ -15,11 +15,11 @@ from pipelines.effects.base import Effect
 from pipelines.effects.bodies import GravityTilt, Payload, TransmissionCoupling
 from pipelines.effects.friction import TorqueOffset
 from pipelines.estimation.estimate import Recipe
+from pipelines.estimation.exact_model import Exact, Named
+from pipelines.estimation.model_fit import Refined, _by_slopes, acting, refine
+from pipelines.estimation.nominal_fit import fit_nominal
+from pipelines.estimation.preparation import Logs, prepare
 from pipelines.io.log import Array
-from pipelines.model.rows.exact import Exact, Named
-from pipelines.model.rows.fit import Refined, _by_slopes, acting, refine
-from pipelines.model.rows.nominal import fit_nominal
-from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnosis.arms import hidden
 
 INERTIA, VISCOUS, COULOMB, SHARPNESS = 0.004, 0.03, 0.2, 90.0

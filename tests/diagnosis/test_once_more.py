@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import pytest
 
 from pipelines.effects.angle import Cogging
-from pipelines.model.rows.families import Wanted
-from pipelines.model.rows.prepare import Logs
+from pipelines.estimation.candidate_columns import Wanted
+from pipelines.estimation.preparation import Logs
 from tests.diagnosis.asking import extended
 from tests.diagnosis.rotor import turned
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.model.rows.residual_analysis import amplitudes, least_order
+from pipelines.estimation.residual_analysis import amplitudes, least_order
 
 ORDERS = np.arange(0.5, 80.25, 0.25)
 T = np.linspace(0.0, 20.0, 2000)

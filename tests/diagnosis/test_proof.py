@@ -12,11 +12,11 @@ import pytest
 
 from pipelines.effects.angle import Cogging
 from pipelines.estimation.estimate import Recipe
-from pipelines.model.rows.exact import Exact
-from pipelines.model.rows.fit import refine
-from pipelines.model.rows.nominal import fit_nominal
-from pipelines.model.rows.prepare import Logs, prepare
-from pipelines.model.rows.residual_analysis import _fine_enough, binned, proof
+from pipelines.estimation.exact_model import Exact
+from pipelines.estimation.model_fit import refine
+from pipelines.estimation.nominal_fit import fit_nominal
+from pipelines.estimation.preparation import Logs, prepare
+from pipelines.estimation.residual_analysis import _fine_enough, binned, proof
 from pipelines.report.diagnosis_finding import proof_figures
 from tests.diagnosis.rotor import turned
 from tests.report.test_diagnosis_words import found

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from pipelines.estimation.estimate import Recipe
+from pipelines.estimation.preparation import Logs, prepare
+from pipelines.estimation.repeated_states import Repeated
+from pipelines.estimation.rows import Data
 from pipelines.io.log import Array
-from pipelines.model.rows.data import Data
-from pipelines.model.rows.prepare import Logs, prepare
-from pipelines.model.rows.repeated import Repeated
 from tests.diagnosis.arms import hidden
 
 NOISE = 0.05

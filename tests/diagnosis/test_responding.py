@@ -14,9 +14,9 @@ from pipelines.diagnosis import engine, extension
 from pipelines.diagnosis.compliance import Compliance, new_causes
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.effects.soft import BaseResonance
+from pipelines.estimation.candidate_columns import Wanted
+from pipelines.estimation.preparation import Logs
 from pipelines.io.log import ExperimentLog
-from pipelines.model.rows.families import Wanted
-from pipelines.model.rows.prepare import Logs
 from tests.diagnose.sessions import but, session
 from tests.diagnosis.asking import answered, extended
 

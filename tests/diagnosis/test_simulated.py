@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.rows.residual_analysis import with_simulation
+from pipelines.estimation.residual_analysis import with_simulation
 from pipelines.simulation.comparison import Strayed
 
 

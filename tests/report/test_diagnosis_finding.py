@@ -12,8 +12,8 @@ from matplotlib.figure import Figure as Drawing
 
 from pipelines.diagnosis.result import Answer, Finding, Gain, Rejected, ResidualRms, Value
 from pipelines.effects import find_effect
-from pipelines.model.rows.fit import TorqueGain
-from pipelines.model.rows.residual_analysis import Proof
+from pipelines.estimation.model_fit import TorqueGain
+from pipelines.estimation.residual_analysis import Proof
 from pipelines.report.diagnosis_finding import draw_proof_in_time, finding_section
 from pipelines.report.diagnosis_report import what_stays
 from pipelines.report.finding_words import how_much, taken_in, where

@@ -26,7 +26,7 @@ from pipelines.diagnosis.result import (
     Value,
 )
 from pipelines.effects import effect_names, find_effect
-from pipelines.model.rows.fit import TorqueGain
+from pipelines.estimation.model_fit import TorqueGain
 from pipelines.report.diagnosis_finding import (
     finding_section,
     gain_table,

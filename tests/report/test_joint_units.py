@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from pipelines.diagnosis.result import BeforeAfter, Diagnosis, Extension, Gain, ResidualRms
+from pipelines.estimation.model_fit import TorqueGain
+from pipelines.estimation.residual_analysis import Curve, Evidence
 from pipelines.excitation.constraints import Limit
-from pipelines.model.rows.fit import TorqueGain
-from pipelines.model.rows.residual_analysis import Curve, Evidence
 from pipelines.report.diagnosis_finding import gain_table
 from pipelines.report.diagnosis_report import torque_errors
 from pipelines.report.words import Units, each, unit_of, units_in

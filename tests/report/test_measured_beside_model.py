@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipelines.estimation.residual_analysis import Evidence
 from pipelines.friction.result import Series
-from pipelines.model.rows.residual_analysis import Evidence
 from pipelines.report import style
 from pipelines.report.diagnosis_picture import residual_figures
 from pipelines.report.figures import compared_figure

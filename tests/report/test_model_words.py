@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from pipelines.model.rows.prepare import FewerTerms
+from pipelines.estimation.preparation import FewerTerms
 from pipelines.report.words import fewer_words, laws_words, threshold_words
 
 MERGED = "w1 = 124 ± 6e+04 s/rad and w2 = 124 ± 9e+04 s/rad may be one"

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure as Drawing
 
 from pipelines.diagnosis.result import Diagnosis, Extension, Finding, Gain, ResidualRms, TipError
 from pipelines.errors import Check
+from pipelines.estimation.model_fit import TorqueGain
 from pipelines.io.model_file import ModelFile
-from pipelines.model.rows.fit import TorqueGain
 from pipelines.report.report import Figure, Report, Section, Table
 from pipelines.report.run_report import Result, Step, run_report, stage_lines, stages_section
 

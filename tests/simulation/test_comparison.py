@@ -11,10 +11,10 @@ from pipelines.dynamics.arm import Acting, Arm
 from pipelines.effects.drives import DriveLag
 from pipelines.errors import InputRejected
 from pipelines.estimation.estimate import Recipe
+from pipelines.estimation.exact_model import Exact
+from pipelines.estimation.nominal_fit import fit_nominal
+from pipelines.estimation.preparation import Logs, Prepared, prepare
 from pipelines.io.log import ExperimentLog
-from pipelines.model.rows.exact import Exact
-from pipelines.model.rows.nominal import fit_nominal
-from pipelines.model.rows.prepare import Logs, Prepared, prepare
 from pipelines.simulation import Experiment, Plant, choose_step, simulate
 from pipelines.simulation.comparison import in_loop, in_loops
 from tests.diagnose.sessions import session

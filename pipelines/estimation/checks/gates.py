@@ -11,9 +11,9 @@ from dataclasses import replace
 from pipelines.errors import Check, InputRejected, NothingMatched
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
+from pipelines.estimation.preparation import Logs
 from pipelines.io.log import ExperimentLog, recording
 from pipelines.model.plausibility import mismatches
-from pipelines.model.rows.prepare import Logs
 from pipelines.quality.checks import Subject, check_log
 from pipelines.simulation.commanded import against_command
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from pipelines.estimation.estimate import Recipe
+from pipelines.estimation.preparation import Logs, prepare
 from pipelines.io.log import Array, Controller, ExperimentLog, Signal
-from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnosis.asking import answered
 from tests.diagnosis.slides import SLIDE
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.model.rows.families import families, lay_family, whole_motion
-from pipelines.model.rows.nominal import fit_nominal, nominal_arm
-from pipelines.model.rows.prepare import Logs, prepare
+from pipelines.estimation.candidate_columns import families, lay_family, whole_motion
+from pipelines.estimation.nominal_fit import fit_nominal, nominal_arm
+from pipelines.estimation.preparation import Logs, prepare
 from tests.diagnosis.arms import hidden
 
 

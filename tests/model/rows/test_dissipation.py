@@ -7,10 +7,10 @@ from scipy.optimize import lsq_linear
 
 from pipelines.effects.friction import Coulomb, TorqueOffset, Viscous
 from pipelines.estimation.estimate import Recipe
-from pipelines.model.rows.exact import Exact
-from pipelines.model.rows.fit import Refined, dissipating, driving, refine
-from pipelines.model.rows.nominal import fit_nominal
-from pipelines.model.rows.prepare import Logs, prepare
+from pipelines.estimation.exact_model import Exact
+from pipelines.estimation.model_fit import Refined, dissipating, driving, refine
+from pipelines.estimation.nominal_fit import fit_nominal
+from pipelines.estimation.preparation import Logs, prepare
 from tests.diagnosis.rotor import turned
 
 

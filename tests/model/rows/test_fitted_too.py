@@ -7,8 +7,8 @@ import pytest
 from benchmarks.hidden_effects.cases import SealedCase, campaign
 from benchmarks.hidden_effects.sessions import record_case
 from pipelines.effects.drives import TorqueSaturation
-from pipelines.model.rows.families import Wanted
-from pipelines.model.rows.prepare import Logs
+from pipelines.estimation.candidate_columns import Wanted
+from pipelines.estimation.preparation import Logs
 from tests.diagnosis.asking import answered, extended
 
 

@@ -9,9 +9,9 @@ import pytest
 
 from pipelines.estimation.estimate import Recipe
 from pipelines.estimation.motion import Reconstruction, reconstruct
+from pipelines.estimation.preparation import Logs, prepare
 from pipelines.io.files import open_log
 from pipelines.io.log import ExperimentLog, derive
-from pipelines.model.rows.prepare import Logs, prepare
 
 
 def with_motion(log: ExperimentLog) -> ExperimentLog:

@@ -7,8 +7,8 @@ import pytest
 
 from pipelines.errors import InputRejected
 from pipelines.estimation.estimate import Recipe
+from pipelines.estimation.preparation import Logs, prepare
 from pipelines.io.log import ExperimentLog
-from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnose.sessions import session
 from tests.healthy import with_signal
 

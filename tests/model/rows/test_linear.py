@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg
 import scipy.signal
 
-from pipelines.model.rows.fit import covariance, left_out, solved, superfluous
+from pipelines.estimation.model_fit import covariance, left_out, solved, superfluous
 
 
 def _table(rows: int = 400, seed: int = 3) -> np.ndarray:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pipelines.estimation.estimate import Recipe
+from pipelines.estimation.nominal_fit import fit_columns, fit_nominal, rows_of
+from pipelines.estimation.preparation import Logs, prepare
 from pipelines.io.files import open_log
-from pipelines.model.rows.nominal import fit_columns, fit_nominal, rows_of
-from pipelines.model.rows.prepare import Logs, prepare
 from sample_logs.make_model import synthetic_arm
 from tests.diagnosis.arms import hidden
 

@@ -8,10 +8,10 @@ import pytest
 from pipelines.dynamics.body import Array, Motion
 from pipelines.effects import find_effect
 from pipelines.estimation.estimate import Recipe
-from pipelines.model.rows.exact import Exact
-from pipelines.model.rows.fit import refine
-from pipelines.model.rows.nominal import fit_nominal
-from pipelines.model.rows.prepare import Logs, Prepared, prepare
+from pipelines.estimation.exact_model import Exact
+from pipelines.estimation.model_fit import refine
+from pipelines.estimation.nominal_fit import fit_nominal
+from pipelines.estimation.preparation import Logs, Prepared, prepare
 from tests.diagnosis.arms import hidden
 
 STEP = 1e-4

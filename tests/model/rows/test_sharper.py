@@ -14,10 +14,10 @@ from bench.machine import Machine
 from bench.plant import Recording, as_log, run
 from pipelines.estimation.estimate import Recipe, motions_of
 from pipelines.estimation.motion import Motions, Reconstruction
+from pipelines.estimation.preparation import sharpened
 from pipelines.estimation.regression import wanted_cutoff
 from pipelines.estimation.tuning import smoother_bandwidth
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.rows.prepare import sharpened
 
 HOW = Reconstruction()
 _ENDS = 100  # samples

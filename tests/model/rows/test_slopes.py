@@ -12,10 +12,10 @@ from pipelines.effects.bodies import GravityTilt
 from pipelines.effects.drives import TorqueGain
 from pipelines.effects.friction import ViscousDrift
 from pipelines.estimation.estimate import Recipe
-from pipelines.model.rows.exact import Exact, slopes_of
-from pipelines.model.rows.fit import refine
-from pipelines.model.rows.nominal import fit_nominal, rigid_rows
-from pipelines.model.rows.prepare import Logs, prepare
+from pipelines.estimation.exact_model import Exact, slopes_of
+from pipelines.estimation.model_fit import refine
+from pipelines.estimation.nominal_fit import fit_nominal, rigid_rows
+from pipelines.estimation.preparation import Logs, prepare
 from tests.diagnosis.arms import hidden
 
 ANGLE = 0.08  # [rad]

@@ -16,15 +16,15 @@ from pipelines.dynamics.body import Motion
 from pipelines.effects.angle import Cogging
 from pipelines.effects.base import Effect
 from pipelines.effects.friction import Coulomb, ThreeSigmoid, TwoSigmoid, Viscous
+from pipelines.estimation.candidate_columns import Wanted
 from pipelines.estimation.estimate import Recipe
+from pipelines.estimation.exact_model import Exact
+from pipelines.estimation.friction_terms import unclear, with_terms_told_apart
+from pipelines.estimation.model_fit import Refined, refine
+from pipelines.estimation.nominal_fit import fit_nominal
+from pipelines.estimation.preparation import BLOCKS, Logs, Prepared, prepare
 from pipelines.io.files import open_log
 from pipelines.io.log import Array
-from pipelines.model.rows.exact import Exact
-from pipelines.model.rows.families import Wanted
-from pipelines.model.rows.fit import Refined, refine
-from pipelines.model.rows.friction_terms import unclear, with_terms_told_apart
-from pipelines.model.rows.nominal import fit_nominal
-from pipelines.model.rows.prepare import BLOCKS, Logs, Prepared, prepare
 from sample_logs.make_model import synthetic_arm
 from tests.diagnosis.arms import hidden, wave
 from tests.diagnosis.asking import extended

@@ -19,11 +19,11 @@ from pipelines.effects.drives import DriveLag, LoadFriction, TorqueLag
 from pipelines.effects.encoders import EncoderEccentricity, TimeDelay
 from pipelines.effects.friction import Coulomb, ViscousDrift
 from pipelines.estimation.estimate import Recipe
+from pipelines.estimation.exact_model import Exact, nominal_slopes, slopes_of
+from pipelines.estimation.model_fit import refine
+from pipelines.estimation.nominal_fit import fit_nominal, rigid_rows
+from pipelines.estimation.preparation import Logs, prepare
 from pipelines.io.log import Array
-from pipelines.model.rows.exact import Exact, nominal_slopes, slopes_of
-from pipelines.model.rows.fit import refine
-from pipelines.model.rows.nominal import fit_nominal, rigid_rows
-from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnose.sessions import but
 from tests.diagnosis.asking import diagnosed, effects
 from tests.diagnosis.rotor import INERTIA, LAG, ORDER, ROTOR, turned

@@ -10,10 +10,10 @@ import pytest
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.signal import lfilter
 
+from pipelines.estimation.candidate_columns import families, lay_family, whole_motion
 from pipelines.estimation.estimate import Recipe
-from pipelines.model.rows.data import Data, Whitening
-from pipelines.model.rows.families import families, lay_family, whole_motion
-from pipelines.model.rows.prepare import Logs, prepare
+from pipelines.estimation.preparation import Logs, prepare
+from pipelines.estimation.rows import Data, Whitening
 from tests.diagnosis.arms import arm, hidden
 
 ROWS = 4000

@@ -20,32 +20,16 @@ from typing import Literal
 
 import numpy as np
 
+from pipelines.estimation.config import ResidualConfig
 from pipelines.estimation.filters import welch
+from pipelines.estimation.model_fit import Refined
+from pipelines.estimation.rows import Data, LogData
 from pipelines.io.log import Array
-from pipelines.model.rows.data import Data, LogData
-from pipelines.model.rows.fit import Refined
 from pipelines.simulation.comparison import Simulation
 
-__all__ = ["Curve", "Evidence", "Proof", "Spectrum", "amplitudes", "binned", "evidence", "least_order", "proof",
-           "with_simulation"]
-
-_CURVE_BINS = 48
-_SERIES = 3000  # points of a series
-_SEGMENT = 512  # rows of a spectrum
-_BAND = 0.8  # of the power that the band holds
-_ORDERS = np.arange(0.5, 80.25, 0.25)  # [1/rev]
-_WAVES = 2.0  # of the lowest order in the range of the angle: half the width of the window's line
-_PART = 0.25  # of a wave of the highest order: angles are counted in parts as wide
+_CONFIG = ResidualConfig()
 _ALIKE = 1e-6  # numerics: of the largest eigenvalue, below which a wave is a constant
-_RARE = 10.0  # times the mean, that a row counts at most at an angle where the joint hardly was
-_AS_MUCH = 0.9  # of what a curve over time shows of a cause
-_BINS, _MOST_BINS = 96, 768  # of a proof: a figure is six inches wide
-_ROWS, _FEWEST = 4, 2  # of a bin, at least; and where finer bins show more
-_FINER = 0.02  # of the predicted power, that twice as many bins have to show
-_CHANCE = 4.0  # standard deviations of what they show by chance
-_SHOWN = 0.2  # of the predicted power, that its means over a signal have to hold
-_STRETCH = 2.0  # [s] of a proof over time
-_SECONDS, _POINTS = 3.0, 1500  # of a simulated log that are shown at most
+_ORDERS = np.arange(0.5, 80.25, 0.25)  # [1/rev]
 
 
 @dataclass(frozen=True)
@@ -137,7 +121,7 @@ class Binned:
         return float(np.sum(self.count * self.mean**2))
 
 
-def binned(x: Array, y: Array, bins: int = _CURVE_BINS, least: int = _ROWS) -> Binned:
+def binned(x: Array, y: Array, bins: int = _CONFIG.curve_bins, least: int = _CONFIG.rows) -> Binned:
     """Return `y` over `x`, in bins of equal count, of `least` rows or more."""
     order = np.argsort(x, kind="stable")
     edges = np.linspace(0, len(x), min(bins, max(1, len(x) // least)) + 1).astype(int)
@@ -180,7 +164,7 @@ def _travel(one: LogData, joint: int) -> Array:
 def least_order(q: Array) -> float:
     """Return the lowest order [1/rev] that is resolved; infinite where the joint stood still."""
     span = float(np.ptp(q)) if len(q) else 0.0
-    return _WAVES * 2.0 * np.pi / span if span > 0.0 else np.inf
+    return _CONFIG.waves * 2.0 * np.pi / span if span > 0.0 else np.inf
 
 
 def amplitudes(q: Array, x: Array, orders: Array) -> Array:
@@ -211,10 +195,12 @@ def amplitudes(q: Array, x: Array, orders: Array) -> Array:
 def _weights(q: Array, highest: float) -> Array:
     """Return von Hann's window (rows,) over the range, shared by the rows at the same angle."""
     along = (q - q.min()) / np.ptp(q)
-    parts = max(1, int(np.ceil(float(np.ptp(q)) * highest / (2.0 * np.pi * _PART))))
+    parts = max(1, int(np.ceil(float(np.ptp(q)) * highest / (2.0 * np.pi * _CONFIG.part))))
     part = np.minimum((along * parts).astype(int), parts - 1)
     count = np.bincount(part, minlength=parts)[part]
-    return np.asarray(np.sin(np.pi * along) ** 2 * np.minimum(1.0 / count, _RARE * parts / len(q)))
+    return np.asarray(
+        np.sin(np.pi * along) ** 2 * np.minimum(1.0 / count, _CONFIG.rare * parts / len(q))
+    )
 
 
 def evidence(done: Refined, floor: Array) -> Evidence:
@@ -231,7 +217,7 @@ def evidence(done: Refined, floor: Array) -> Evidence:
             curve = (means.x, means.mean, means.spread, share)
             curves.append(Curve(joint + 1, one.name, one.unit, *curve))
         spectra += _spectra(data, left, joint)
-    every = max(1, -(-len(measured) // _SERIES))
+    every = max(1, -(-len(measured) // _CONFIG.series))
     return Evidence(
         data.logs[0].log.name,
         data.logs[0].t[::every],
@@ -270,7 +256,7 @@ def _over_frequency(one: LogData, x: Array) -> tuple[Array, Array] | None:
     if len(x) < 64:
         return None
     step = float(np.median(np.diff(one.t)))
-    frequency, density = welch(x[:, None], 1.0 / step, min(_SEGMENT, len(x) // 2))
+    frequency, density = welch(x[:, None], 1.0 / step, min(_CONFIG.segment, len(x) // 2))
     return frequency, np.sqrt(density[:, 0] * (frequency[1] - frequency[0]))
 
 
@@ -281,7 +267,7 @@ def _bands(spectra: list[Spectrum], joints: int) -> Array:
         if one.over == "frequency":
             power = np.square(one.amplitude)
             total = np.cumsum(power) / max(float(power.sum()), 1e-300)
-            ends = np.searchsorted(total, (0.5 - 0.5 * _BAND, 0.5 + 0.5 * _BAND))
+            ends = np.searchsorted(total, (0.5 - 0.5 * _CONFIG.band, 0.5 + 0.5 * _CONFIG.band))
             out[one.joint - 1] = one.x[np.minimum(ends, len(one.x) - 1)]
     return out
 
@@ -313,9 +299,9 @@ def proof(
     power = {one: binned(one.values, parts[2]).power for one in (time, *others)}
     # in a log that goes once through its range anything is shown over time: when, and not by what
     best = max(others, key=lambda one: power[one])
-    if event or power[best] < _AS_MUCH * power[time]:
+    if event or power[best] < _CONFIG.as_much * power[time]:
         best = time
-    if not event and power[best] < _SHOWN * float(parts[2] @ parts[2]):
+    if not event and power[best] < _CONFIG.shown * float(parts[2] @ parts[2]):
         place = max(range(len(data.logs)), key=lambda k: _power_in(data, three[2], k, shown))
         lines = [
             _over_frequency(data.logs[place], list(data.split(x))[place][shown]) for x in three
@@ -337,7 +323,7 @@ def _over(
 ) -> Proof:
     """Return `parts`, without the finding, with it and what it predicts, over a signal."""
     bins = _fine_enough(signal.values, parts[2])
-    before, after, predicted = (binned(signal.values, x, bins, _FEWEST) for x in parts)
+    before, after, predicted = (binned(signal.values, x, bins, _CONFIG.fewest) for x in parts)
     curves = (before.x, before.mean, after.mean, predicted.mean)
     spread = before.spread / np.sqrt(before.count)
     return Proof(joint + 1, signal.name, signal.unit, *curves, spread, *over_time)
@@ -348,11 +334,11 @@ def _fine_enough(x: Array, predicted: Array) -> int:
 
     What scatters within a bin, and not along x, makes none of them finer.
     """
-    bins = min(_BINS, max(1, len(x) // _ROWS))
-    least, (here, _) = _FINER * float(predicted @ predicted), _surely(x, predicted, bins)
-    while bins < _MOST_BINS:
+    bins = min(_CONFIG.bins, max(1, len(x) // _CONFIG.rows))
+    least, (here, _) = _CONFIG.finer * float(predicted @ predicted), _surely(x, predicted, bins)
+    while bins < _CONFIG.most_bins:
         finer, chance = _surely(x, predicted, 2 * bins)
-        if finer - here <= max(least, _CHANCE * chance):
+        if finer - here <= max(least, _CONFIG.chance * chance):
             break
         bins, here = 2 * bins, finer
     return bins
@@ -360,7 +346,7 @@ def _fine_enough(x: Array, predicted: Array) -> int:
 
 def _surely(x: Array, y: Array, bins: int) -> tuple[float, float]:
     """Return the power of the means less what they have by chance, and the deviation of that."""
-    means = binned(x, y, bins, _FEWEST)
+    means = binned(x, y, bins, _CONFIG.fewest)
     chance = means.spread**2 * means.count / np.maximum(means.count - 1.0, 1.0)
     # the mean of all bins: of pairs of rows one squared deviation is far from its mean
     deviation = float(np.sqrt(2.0 * len(chance)) * np.mean(chance))
@@ -376,7 +362,7 @@ def _stretch(data: Data, predicted: Array) -> tuple[Array, slice]:
     times = np.concatenate([one.t for one in data.logs])
     for one in data.logs:
         step = float(np.median(np.diff(one.t))) if one.rows > 1 else 1.0
-        size = max(2, min(one.rows, round(_STRETCH / step)))
+        size = max(2, min(one.rows, round(_CONFIG.stretch / step)))
         for start in range(first, first + one.rows - size + 1, max(1, size // 2)):
             power = float(np.var(predicted[start : start + size]))
             if power > best:
@@ -390,8 +376,8 @@ def with_simulation(one: Evidence, nominal: Simulation, extended: Simulation) ->
     if nominal.first is None or extended.first is None:
         return one
     first, other = nominal.first, extended.first.error
-    samples = int(np.searchsorted(first.t, _SECONDS))
-    shown = slice(0, samples, max(1, samples // _POINTS))
+    samples = int(np.searchsorted(first.t, _CONFIG.seconds))
+    shown = slice(0, samples, max(1, samples // _CONFIG.points))
     return replace(
         one,
         simulated_t=first.t[shown],
