@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import product
 from math import factorial
 from typing import Any
 
@@ -132,8 +133,11 @@ def thinned(x: npt.NDArray[Any], response: Array, count: int) -> npt.NDArray[Any
 
 def fast_length(least: int) -> int:
     """Return the smallest 2^a 3^b 5^c from `least` on: the length of a fast Fourier transform."""
-    odd = [3**b * 5**c for b in range(20) for c in range(14)]
-    return min([k * (1 << max(0, (-(-least // k) - 1).bit_length())) for k in odd])
+    best = 1 << (least - 1).bit_length()
+    for three, five in product(range(20), range(14)):
+        odd: int = 3**three * 5**five
+        best = min(best, odd << max(0, (-(-least // odd) - 1).bit_length()))
+    return best
 
 
 def passed_both_ways(frequency: Array, cutoff_hz: float, rate: float, order: int = 4) -> Array:
