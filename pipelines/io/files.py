@@ -135,10 +135,7 @@ def open_log(
         container, checks = _container(path, os.pread(handle, 8, 0), status.st_size)
         _refuse_unlisted(path, sha256)
         read = hdf5.read_parts if container == "hdf5" else parquet.read_parts
-        try:
-            parts = guarded(lambda: read(path, wanted), path)
-        finally:  # before its content is blamed
-            _refuse_modified(path, handle, status)
+        parts = guarded(lambda: read(path, wanted), path)
     log = _verified(parts, path, whole=only is None)
     if parts.about["digest"] is None:
         words = "no integrity data: nothing would notice a flipped bit"
@@ -174,32 +171,31 @@ def _verified(parts: Answer, path: Path, *, whole: bool) -> ExperimentLog:
 
 @contextlib.contextmanager
 def _reading(path: Path) -> Iterator[int]:
-    """Open with a shared lock, which fails at once where a program is writing (F15)."""
+    """Open with a shared lock, which fails at once where a program is writing (F15).
+
+    A file that is another afterwards is refused (F14), before its content is blamed.
+    """
     import fcntl
 
+    wait = "wait until the recording is finished"
     with environment_faults(path):
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     try:
-        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(handle)
-        words, remedy = "in use by another process", "wait until the recording is finished"
-        raise EnvironmentFault("F15", words, path, remedy) from None
-    except OSError:
-        pass  # a file system without locks
-    try:
-        yield handle
+        with contextlib.suppress(OSError):  # of a file system without locks
+            try:
+                fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise EnvironmentFault("F15", "in use by another process", path, wait) from None
+        before = os.fstat(handle)
+        try:
+            yield handle
+        finally:
+            for now in (os.fstat(handle), path.stat()):
+                same = (now.st_size, now.st_mtime_ns, now.st_ino)
+                if same != (before.st_size, before.st_mtime_ns, before.st_ino):
+                    raise InputRejected("F14", "was modified while it was read", path, wait)
     finally:
         os.close(handle)
-
-
-def _refuse_modified(path: Path, handle: int, before: os.stat_result) -> None:
-    """Refuse a file that is not what it was when it was opened (F14)."""
-    for now in (os.fstat(handle), path.stat()):
-        same = (now.st_size, now.st_mtime_ns, now.st_ino)
-        if same != (before.st_size, before.st_mtime_ns, before.st_ino):
-            words, remedy = "was modified while it was read", "wait until the recording is finished"
-            raise InputRejected("F14", words, path, remedy)
 
 
 def _container(path: Path, magic: bytes, size: int) -> tuple[str, list[Check]]:
