@@ -43,7 +43,10 @@ def write(path: Path, parts: Answer) -> None:
         file.create_dataset("robot", data=robot, dtype=h5py.string_dtype("utf-8"))
         signals = file.create_group("signals")
         for name, values in parts.arrays.items():
-            dataset = _write_samples(signals, name, values)
+            how = {"dtype": "<f8", "track_times": False}  # what has no samples has no chunks
+            if values.size:
+                how = _OPTIONS | {"chunks": (min(LIMITS.chunk, len(values)), 1)[: values.ndim]}
+            dataset = signals.create_dataset(name, data=values, **how)
             dataset.attrs.update(parts.about["signals"][name])
 
 
@@ -62,13 +65,6 @@ def _written_to(path: Path) -> Iterator[Any]:
         file.flush()
         image = file.id.get_file_image()
     path.write_bytes(image)
-
-
-def _write_samples(owner: Any, name: str, values: Array) -> Any:
-    if values.size == 0:
-        return owner.create_dataset(name, data=values, dtype="<f8", track_times=False)
-    chunk = (min(LIMITS.chunk, len(values)),) + (1,) * (values.ndim - 1)
-    return owner.create_dataset(name, data=values, chunks=chunk, **_OPTIONS)
 
 
 def _write_attributes(owner: Any, attributes: Mapping[str, Any]) -> None:

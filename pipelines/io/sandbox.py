@@ -277,7 +277,10 @@ def _received(reader: int, path: Path, longest: int, memory: int, seconds: float
     if "internal" in reply:
         raise RuntimeError(f"reading {path}: {reply['internal']}")
     if "error" in reply:
-        raise _error(reply["error"], path)
+        kinds = {kind.exit_code: kind for kind in (UsageError, InputRejected, EnvironmentFault)}
+        told = reply["error"]
+        where, code = told["where"] or path, told["code"].removeprefix("RRID-")
+        raise kinds.get(told["exit"], InputRejected)(code, told["message"], where, told["remedy"])
     shapes = reply["shapes"]
     sizes = [8 * math.prod(shape) for shape in shapes.values()]
     if sum(sizes) > memory or any(n < 0 for shape in shapes.values() for n in shape):
@@ -304,12 +307,6 @@ def _read(reader: int, place: Place, deadline: float) -> Place:
             raise EOFError
         left = left[count:]
     return place
-
-
-def _error(error: Mapping[str, Any], path: Path) -> RrridError:
-    kinds = {kind.exit_code: kind for kind in (UsageError, InputRejected, EnvironmentFault)}
-    kind, code = kinds.get(error["exit"], InputRejected), error["code"].removeprefix("RRID-")
-    return kind(code, error["message"], error["where"] or path, error["remedy"])
 
 
 def _reaped(child: int, *, kill: bool) -> int:

@@ -122,7 +122,19 @@ def import_urdf(path: str | Path, tip_link: str | None = None) -> RobotDescripti
     try:
         tree = _tree_of(_read(path), str(path))
         way, tip = _way_to_tip(tree, tip_link)
-        joints = tuple(_described(tree, joint, way) for joint in way if joint.moves)
+        moving = [joint for joint in way if joint.moves]
+        stop = tuple(joint.name for joint in moving)
+        joints = tuple(
+            Joint(
+                joint.name,
+                "prismatic" if joint.type == "prismatic" else "revolute",
+                position=joint.range,
+                velocity=joint.velocity,
+                torque=joint.effort,
+                link=_link(tree, joint.child, stop),
+            )
+            for joint in moving
+        )
         checks = _impossible_links(tree)
     except InputRejected as problem:
         code = problem.code.removeprefix("RRID-")
@@ -130,17 +142,6 @@ def import_urdf(path: str | Path, tip_link: str | None = None) -> RobotDescripti
     gravity, text = (0.0, 0.0, -9.81), _canonical(tree, way)
     return RobotDescription(
         tree.name, gravity, "urdf", joints, urdf_text=text, tip_link=tip, checks=checks
-    )
-
-
-def _described(tree: _Tree, joint: _Joint, way: list[_Joint]) -> Joint:
-    return Joint(
-        joint.name,
-        "prismatic" if joint.type == "prismatic" else "revolute",
-        position=joint.range,
-        velocity=joint.velocity,
-        torque=joint.effort,
-        link=_link(tree, joint.child, tuple(one.name for one in way if one.moves)),
     )
 
 
