@@ -25,6 +25,7 @@ from pipelines.estimation.grids import grid, resample
 from pipelines.importers.assemble import Map, Material, Source, assemble, collect, parse_map
 from pipelines.importers.config import REPAIR
 from pipelines.importers.guess import Draft, guess_recipe
+from pipelines.importers.links import TorqueModel
 from pipelines.importers.make_log import ImportedTable, SourceFile, examine, import_table, make_log
 from pipelines.importers.patterns import fill, unique
 from pipelines.importers.recipe import ResampleSpec
@@ -32,7 +33,7 @@ from pipelines.importers.repair import Limits, Recording, late_intervals, repair
 from pipelines.importers.units import Converted, joint_side
 from pipelines.io import schema
 from pipelines.io.files import write_log
-from pipelines.io.log import Array, ExperimentLog, Signal
+from pipelines.io.log import ExperimentLog, Signal
 from pipelines.io.option import option
 from pipelines.io.parquet import write_table
 from pipelines.io.results import NOT_STORED
@@ -50,13 +51,13 @@ def draft_recipe(path: Path, robot: str | None = None) -> Draft:
         InputRejected: the file cannot be read as a table of numbers.
     """
 
-    def link_torque(robot: RobotDescription, q: Array, dq: Array, ddq: Array) -> Array | None:
+    def torque_of_links(robot: RobotDescription) -> TorqueModel | None:
         body = rigid_body(robot)
         p = body.known_parameters()
-        return None if p is None else body.torque(q, dq, ddq, p)
+        return None if p is None else lambda q, dq, ddq: body.torque(q, dq, ddq, p)
 
     regular_file(path, what="one recording, such as a CSV file")
-    return guess_recipe(path, robot, link_torque)
+    return guess_recipe(path, robot, torque_of_links)
 
 
 @dataclass(frozen=True)

@@ -77,8 +77,7 @@ def guess_recipe(path: Path, robot: str | None = None, model: Model | None = Non
 
     Args:
         robot: description to use instead of that in the folder of the recording.
-        model: the torques (samples, joints) [N m] of a robot at q, dq, ddq [rad], None where its
-            links are unknown.
+        model: the torque of a robot's links by its description.
 
     Raises:
         InputRejected: the file cannot be read as a table of numbers.
@@ -243,10 +242,11 @@ class _Drafting:
             if turning and ordered and _doubt(found, "q") is None:
                 of_q = UNITS.get(found.q_units[0])
                 size = of_q.factor * slope.factor if of_q else math.nan
-                named = UNITS.get(named_units(found, group, table)[0] or "")
+                named = named_units(found, group, table)[0]
                 off = {speed: abs(size / UNITS[speed].factor - 1.0) for speed in _SPEEDS}
                 near = (speed for speed in _SPEEDS if off[speed] <= EVIDENCE.same_ratio)
-                unit = next((u for u in near if named in (None, UNITS[u])), "")
+                fits = (u for u in near if not named or UNITS.get(named) == UNITS[u])
+                unit = next(fits, "")
         if not unit or slope is None:
             return [f"    # left out: {group.words} (velocity), {columns}"]
         why = f"the position's slope is {slope.factor:.4g} times it"

@@ -18,7 +18,6 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 
 from pipelines.errors import InputRejected
 from pipelines.importers.config import TEXT
@@ -363,16 +362,17 @@ def names_and_units(cells: Sequence[str]) -> tuple[tuple[str, ...], dict[str, st
 
 def labelled_lines(lines: list[Line]) -> tuple[tuple[str, ...], list[tuple[int, list[str]]]] | None:
     """Return the names, and the number and texts of each line with them; None of other text."""
-    middle = [line for _, line in lines[len(lines) // 4 :][: TEXT.sampled]]
+    middle = [_form(line)[0] for _, line in lines[len(lines) // 4 :][: TEXT.sampled]]
     if any(len(line) > TEXT.longest_line for _, line in lines):
         return None
-    if sum(len(_LABEL.findall(_form(line)[0])) for line in middle) < 2 * len(middle):
+    if sum(len(_LABEL.findall(form)) for form in middle) < 2 * len(middle):
         return None
-    named, count = Counter(_names_in(_form(line)[0]) for line in middle).most_common(1)[0]
+    named, count = Counter(map(_names_in, middle)).most_common(1)[0]
     if count < TEXT.one_form * len(middle) or len(set(named)) < max(len(named), 2):
         return None
     forms = [(number, *_form(line)) for number, line in lines]
-    rows = [(number, values) for number, form, values in forms if _names_in(form) == named]
+    alike = {form for form in {form for _, form, _ in forms} if _names_in(form) == named}
+    rows = [(number, values) for number, form, values in forms if form in alike]
     return (named, rows) if len(rows) >= TEXT.one_form * len(lines) else None
 
 
@@ -384,7 +384,6 @@ def _form(line: str) -> tuple[str, list[str]]:
     return " ".join("".join(pieces).split()), values
 
 
-@lru_cache(maxsize=1000)  # the words of a line may vary
 def _names_in(form: str) -> tuple[str, ...]:
     """Return the name of each number in a line's form: its label, with a place among several."""
     found: list[str] = []

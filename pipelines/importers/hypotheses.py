@@ -11,7 +11,6 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 
@@ -33,7 +32,7 @@ from pipelines.importers.evidence import (
     weigh,
     whole,
 )
-from pipelines.importers.links import LinkFit, best_unit, fits_by_unit, unlike_links
+from pipelines.importers.links import LinkFit, TorqueModel, best_unit, fits_by_unit, unlike_links
 from pipelines.importers.names import quantity_of
 from pipelines.importers.notes import (
     Statement,
@@ -62,7 +61,8 @@ _MOTOR_SIDE = re.compile(
     r"(motor|rotor|drive)[ _-]*(side|shaft|seit)|before the gear", re.IGNORECASE
 )
 
-Model = Callable[[RobotDescription, Array, Array, Array], Array | None]
+# The torque of a robot's links; None where a link is unknown.
+Model = Callable[[RobotDescription], TorqueModel | None]
 
 
 @dataclass
@@ -119,12 +119,11 @@ def infer(reading: Reading, model: Model | None) -> Findings:
         _units_of_positions(found, q)  # by name, for the comparison with the links
         found.fits = _fits(found, q, model)
         _units_of_positions(found, q)
-        unit = found.q_units[0]
-        fits = [fit for key, fit in found.fits.items() if key in (NAMED, unit)]
+        fits = [fit for key, fit in found.fits.items() if key in (NAMED, found.q_units[0])]
         fits = fits or list(found.fits.values())
         fits = [fit for fit in fits if fit.followed] or fits
-        best = min((f for f in fits if f.varies), key=lambda fit: fit.unexplained, default=None)
-        found.links = best
+        varied = (fit for fit in fits if fit.varies)
+        found.links = min(varied, key=lambda fit: fit.unexplained, default=None)
     if found.links is not None and found.links.followed and tau is not None:
         known = UNITS.get(named_units(found, tau, reading.torque_table)[0] or "N m")
         found.followed = known is not None and not unlike_links(found.links, known.factor, False)
@@ -133,10 +132,8 @@ def infer(reading: Reading, model: Model | None) -> Findings:
     if tau is not None and found.tau is not None:
         _units_of_torques(found, tau, found.tau)
     if found.q is not None and found.tau is not None and found.q.shape == found.tau.shape:
-        followed = found.links is not None and found.links.followed
-        found.sign = sign_of(
-            found.q, found.tau, found.links.signs if found.links and followed else None
-        )
+        links = found.links if found.links is not None and found.links.followed else None
+        found.sign = sign_of(found.q, found.tau, links.signs if links else None)
     return found
 
 
@@ -214,7 +211,8 @@ def _fits(found: Findings, group: Group, model: Model | None) -> dict[str, LinkF
     if model is None or robot is None or q is None or tau is None or tau.shape != q.shape:
         return {}
     t = table.rows / found.rate if found.t is None else found.t
-    if not all(robot.revolute) or not np.median(np.diff(t)) > 0.0:
+    torque = model(robot) if all(robot.revolute) else None
+    if torque is None or not np.median(np.diff(t)) > 0.0:
         return {}
     sizes = {unit: known.factor for unit, known in UNITS.items()}
     if found.counts and found.counts.number > 0.0:
@@ -224,7 +222,7 @@ def _fits(found: Findings, group: Group, model: Model | None) -> dict[str, LinkF
         if not set(found.q_units) <= sizes.keys():
             return {}
         factors[NAMED] = np.array([sizes[unit] for unit in found.q_units])
-    return fits_by_unit(partial(model, robot), q, tau, t, factors)
+    return fits_by_unit(torque, q, tau, t, factors)
 
 
 def _as_said(guess: Guess, own: str | None) -> Guess:

@@ -21,8 +21,8 @@ from pipelines.importers.config import LINKS
 from pipelines.io.limits import FEWEST
 from pipelines.io.log import Array
 
-# (samples, joints) q, dq, ddq [rad] -> torque [N m]; None where links are unknown
-TorqueModel = Callable[[Array, Array, Array], Array | None]
+# (samples, joints) q, dq, ddq [rad] -> torque [N m] of a robot's links
+TorqueModel = Callable[[Array, Array, Array], Array]
 Motion = tuple[Array, Array, Array]  # q, dq, ddq
 
 
@@ -53,7 +53,7 @@ def fits_by_unit(
     for unit, factor in factors.items() if len(torque) >= FEWEST else ():  # else uneven steps
         motion = _smooth(np.unwrap(q * factor, axis=0), t)
         links = model(*motion)
-        if links is not None and np.isfinite(links).all():
+        if np.isfinite(links).all():
             q_some, dq_some, ddq_some = (x[::every] for x in motion)
             otherwise = _otherwise(model, (q_some, dq_some, ddq_some), torque[::every])
             found[unit] = _fit(torque, links, motion[1], otherwise)
@@ -146,8 +146,6 @@ def _otherwise(model: TorqueModel, motion: Motion, tau: Array) -> str:
     where a drive turns it by such a rod, N^T times the drives'.
     """
     links, n, dq = model(*motion), tau.shape[1], motion[1]
-    if links is None:
-        return ""
     changes: list[tuple[str, Array, bool]] = []
     for a, b in itertools.combinations(range(n), 2):
         exchange = np.eye(n)
@@ -163,24 +161,28 @@ def _otherwise(model: TorqueModel, motion: Motion, tau: Array) -> str:
     for words, change, exchanged in changes:
         q, speed, acceleration = (x @ change.T for x in motion)
         other = model(q, speed, acceleration)
-        shares = [_unexplained(tau @ change.T, links, dq)] if exchanged else []
-        if other is not None:
-            shares.append(_unexplained(tau, other @ change, dq))
-            shares += [] if exchanged else [_unexplained(tau, other, speed)]
-        if min(shares, default=math.inf) < best:
-            best, found = min(shares), words
+        if exchanged:
+            second = _unexplained(tau @ change.T, links, dq)
+        else:
+            second = _unexplained(tau, other, speed)
+        share = min(second, _unexplained(tau, other @ change, dq))
+        if share < best:
+            best, found = share, words
     return found
 
 
 def _smooth(q: Array, t: Array) -> Motion:
-    """Return values and two derivatives (samples, joints) by local cubics, where no gap is near."""
-    from scipy.signal import savgol_filter
+    """Return values and two derivatives (samples, joints) by local cubics, where no gap is near.
 
+    Least squares in a window about each sample (Savitzky & Golay 1964).
+    """
     step = float(np.median(np.diff(t)))
     width = max(LINKS.fewest, min(round(LINKS.window / step), (len(q) - 1) // 2) | 1)
     half = width // 2
     lasts = t[2 * half :] - t[: -2 * half]  # a window over a gap lasts longer
-    some = half + np.flatnonzero(np.abs(lasts - (width - 1) * step) < 0.5 * width * step)
+    some = np.flatnonzero(np.abs(lasts - (width - 1) * step) < 0.5 * width * step)
     some = some[:: max(1, len(some) // LINKS.samples)]
-    q, dq, ddq = (savgol_filter(q, width, 3, deriv=k, delta=step, axis=0)[some] for k in range(3))
-    return q, dq, ddq
+    value, slope, curve, _ = np.linalg.pinv(np.vander(np.linspace(-1.0, 1.0, width), 4)[:, ::-1])
+    windows = np.lib.stride_tricks.sliding_window_view(q, width, axis=0)[some]
+    reach = half * step
+    return windows @ value, windows @ slope / reach, windows @ curve * 2.0 / reach**2

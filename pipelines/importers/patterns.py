@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
 from pathlib import Path
 
 from pipelines.errors import EnvironmentFault, InputRejected, UsageError
@@ -22,7 +21,6 @@ def each(patterns: Patterns) -> tuple[str, ...]:
     return (patterns,) if isinstance(patterns, str) else patterns
 
 
-@lru_cache(maxsize=256)
 def _compiled(pattern: str) -> re.Pattern[str]:
     """Return the regular expression of a pattern.
 
@@ -65,11 +63,10 @@ def matches(
         UsageError: C02, a pattern is invalid, or takes too long.
     """
     flat = [pattern for patterns in every for pattern in each(patterns)]
-    for pattern in flat:
-        _compiled(pattern)
+    compiled = [[_compiled(pattern) for pattern in each(patterns)] for patterns in every]
 
     def work() -> list[dict[str, dict[str, str]]]:
-        fits = [{name: match(patterns, name) for name in names} for patterns in every]
+        fits = [{name: _groups(some, name) for name in names} for some in compiled]
         return [{k: groups for k, groups in fit.items() if groups is not None} for fit in fits]
 
     if all(":" not in p and len(re.findall(r"\{|\*+", p)) <= RECIPE.simple for p in flat):
@@ -90,10 +87,12 @@ def matches(
 
 def match(patterns: Patterns, relative: str) -> dict[str, str] | None:
     """Return the groups of the first pattern that fits the path, and {stem}; None otherwise."""
-    for pattern in each(patterns):
-        if found := _compiled(pattern).fullmatch(relative):
-            return {"stem": Path(relative).stem} | found.groupdict(default="")
-    return None
+    return _groups([_compiled(pattern) for pattern in each(patterns)], relative)
+
+
+def _groups(compiled: Sequence[re.Pattern[str]], relative: str) -> dict[str, str] | None:
+    found = next((x for x in (one.fullmatch(relative) for one in compiled) if x), None)
+    return {"stem": Path(relative).stem} | found.groupdict(default="") if found else None
 
 
 def fill(template: str, groups: Mapping[str, str], where: object) -> str:
