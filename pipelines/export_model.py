@@ -2,7 +2,7 @@
 
 Reads    a model file, the covariance.json in its folder if there is one, and logs to replay
 Writes   the exported file or files, covariance.json of the link parameters, result.json
-Source   Wensing, Kim & Slotine 2018 and Lee, Wensing & Park 2018 (links that could exist)
+Source   Wensing, Kim & Slotine 2018; Lee & Park 2018 (links that could exist)
 
 Base parameters become links that could exist and have the same torque. Every cause of the model is
 carried exactly, approximated by the friction and damping that the target has, or lost; the card

@@ -47,6 +47,7 @@ REQUIRED = ("a", "b", "folder", "root")
 IDLE: dict[str, tuple[str, ...]]
 IDLE = {"inspect": ("format",), "frf": ("format",), "diagnose": ("format",)}
 IDLE |= {"import": ("check",), "convert": ("check",), "simulate": ("check",)}
+IDLE |= {"export": ("check", "format")}
 IDLE |= {"demo": ("robot", "assume_units")}
 IDLE |= {"compare": ("robot", "assume_units", "format", "strict")}
 # Shared options of commands that do not take them all.

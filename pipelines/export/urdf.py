@@ -18,7 +18,7 @@ from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.kinematics import Placement
 from pipelines.export.config import EXPORT
-from pipelines.export.target import ExportJoint, Held, JointTerms, Loaded, Target
+from pipelines.export.target import ExportJoint, Held, JointTerms, Loaded, Target, identifier
 
 __all__ = ["URDF", "numbers", "text_of"]
 
@@ -33,15 +33,18 @@ def _carry(acting: Acting) -> Acting | None:
 def _write(held: Held) -> tuple[dict[str, str], tuple[str, ...]]:
     """Return the text of a URDF, and what it cannot hold of the body."""
     robot, notes, parent = Element("robot", name=held.name), list[str](), held.root
+    names = [joint.name for joint in held.joints]
+    mount, flange = identifier("mount", names), identifier(f"{held.tip}_fixed", names)
+    ground = identifier("ground", [held.root, held.tip, *(joint.link for joint in held.joints)])
     size = float(np.linalg.norm(held.gravity))
     if abs(size - EXPORT.standard_gravity) > _LEVEL:
         words = f"gravity is {size:.6g} m/s^2: set it in the program that reads the URDF"
         notes.append(f"{words}, which takes {EXPORT.standard_gravity:g}")
     if size and held.gravity[2] / size > -1.0 + _LEVEL:
         words = "gravity does not point along -z of the base: the base hangs turned from"
-        notes.append(f"{words} the fixed joint 'mount', so that it does in the world")
-        SubElement(robot, "link", name="ground")
-        _joined(robot, "mount", "fixed", "ground", held.root, _upright(-held.gravity / size))
+        notes.append(f"{words} the fixed joint '{mount}', so that it does in the world")
+        SubElement(robot, "link", name=ground)
+        _joined(robot, mount, "fixed", ground, held.root, _upright(-held.gravity / size))
     SubElement(robot, "link", name=held.root)
     for joint, terms in zip(held.joints, held.terms, strict=True):
         _link(robot, joint)
@@ -51,7 +54,7 @@ def _write(held: Held) -> tuple[dict[str, str], tuple[str, ...]]:
             words = f"'{joint.name}' has no limit of speed or torque: {EXPORT.unlimited:g}"
             notes.append(f"{words} is written, for a URDF must have one")
     SubElement(robot, "link", name=held.tip)
-    _joined(robot, f"{held.tip}_fixed", "fixed", parent, held.tip, held.tool)
+    _joined(robot, flange, "fixed", parent, held.tip, held.tool)
     return {f"{held.name}.urdf": text_of(robot)}, tuple(notes)
 
 

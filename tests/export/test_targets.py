@@ -206,3 +206,11 @@ def test_mixed_effects_are_known_to_python_alone() -> None:
     assert off(folded(arm).torque(states), arm.torque(states)) <= ROUNDING
     assert C.carry(folded(arm).effects[-1]) is not None
     assert isinstance(folded(arm).effects[0].effect, Effect)
+
+
+def test_laws_of_friction_see_the_rigid_body_alone() -> None:
+    """As laws of a nominal model, not as causes around it: friction by load knows no other friction then."""
+    laws = [caused(name, joint, **VALUES[name]) for joint in (1, 2, 3) for name in ("coulomb", "stribeck", "load_friction")]
+    arm = replace(synthetic_arm(), friction=(*laws, caused("asymmetric_friction", 2, **VALUES["asymmetric_friction"])))
+    states = random_states(arm.robot, None)
+    assert off(exported(arm, "c").torque(states), arm.torque(states)) <= ROUNDING

@@ -155,6 +155,16 @@ def test_gravity_of_a_wall_is_turned_into_the_world(tmp_path: Path) -> None:
     assert off(np.array(theirs), wall.torque(states)) <= 1e-9
 
 
+def test_names_that_the_export_would_take_are_free(tmp_path: Path) -> None:
+    """A joint called mount and a link called ground, on a wall."""
+    text = PLAIN.replace('name="elbow"', 'name="mount"').replace('"base"', '"ground"').replace('"lower"', '"tip"')
+    arm = read(text, tmp_path)
+    wall = Arm.from_links(replace(arm.robot, gravity=(0.0, 9.81, 0.0)))
+    states = random_states(arm.robot, None)
+    for to in ("urdf", "mjcf"):
+        assert off(exported(wall, to).torque(states), wall.torque(states)) <= 1e-9
+
+
 def test_another_size_of_gravity_is_told() -> None:
     """The paper's arm has 9.8062 m/s^2."""
     assert any("gravity is 9.8062" in note for note in exported(synthetic_arm(), "urdf").notes)
