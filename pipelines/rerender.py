@@ -117,7 +117,8 @@ def _is_drawn(name: str) -> bool:
 def _report(stored: StoredResult) -> Report:
     """Return the report as the stage draws it of what was stored."""
     object_ = {key: value for key, value in stored.object.items() if key not in headed("", {})}
-    module = "import_log" if stored.command == "import" else stored.command.replace("-", "_")
+    own = {"import": "import_log", "export": "export_model"}
+    module = own.get(stored.command, stored.command.replace("-", "_"))
     try:
         if stored.command == "batch":
             return batch_report(decode(BatchResult, object_, {}))

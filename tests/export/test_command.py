@@ -16,6 +16,7 @@ from pipelines.errors import InputRejected, RrridError, UsageError
 from pipelines.export_model import STAGE, Card, Settings
 from pipelines.io.files import write_log
 from pipelines.io.model_file import read_covariance, write_covariance, write_model
+from pipelines.rerender import rerender
 from pipelines.stage import Outcome, Request, run_stage
 from sample_logs.make_model import synthetic_arm
 from tests.controlled import controlled_log
@@ -50,6 +51,7 @@ def test_what_is_left(to: str, files: set[str], tmp_path: Path) -> None:
     assert covariance.shape == (30, 30)
     assert np.linalg.eigvalsh(covariance).min() > -1e-12
     assert outcome.exit_code == 0
+    assert rerender(outcome.folder, None).verdict == outcome.report.verdict
 
 
 def test_the_card_names_every_cause_with_its_cost(tmp_path: Path) -> None:
