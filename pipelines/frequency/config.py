@@ -118,6 +118,7 @@ class HeldConfig:
     alike: float = 0.15  # share of the frequency over which that is the same: its bins are one
     weighings: int = 4  # times that the variance of the rest is renewed
     evaluations: int = 10  # of each refinement
+    rank: float = 1e-12  # of normal equations, below which a direction is rounding
     attenuated: float = 0.5  # share of noise in normal equations beyond which it stays in them
     draws: int = 24  # of the response within what is known of the coupling
     fewest: int = 20  # bins

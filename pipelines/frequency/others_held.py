@@ -21,6 +21,7 @@ import numpy as np
 
 from pipelines.estimation.bounded import least_squares
 from pipelines.frequency.config import HeldConfig
+from pipelines.frequency.rational import inverse
 from pipelines.frequency.spectra import Array, Complex, FrequencyResponse, Responses, closed_loop
 
 __all__ = ["Held", "others_held"]
@@ -282,8 +283,8 @@ def _linear(
     factors, directions = _factors(rows, shape, kinds, turned)
     stacked, size = _scaled(factors * (directions @ rows.acceleration.T) / spread)
     right = _parts(rows.torque / spread)
-    inverse = np.linalg.pinv(stacked @ stacked.T, rcond=1e-10, hermitian=True)
-    gains = inverse @ (stacked @ right)
+    solved = np.linalg.pinv(stacked @ stacked.T, rcond=1e-10, hermitian=True)
+    gains = solved @ (stacked @ right)
     return _Fit(shape, kinds, turned, gains / size, right - gains @ stacked, spread)
 
 
@@ -307,8 +308,8 @@ def _costs(
     normal[:, :count, count:] = normal[:, count:, :count].swapaxes(1, 2)
     normal[:, count:, count:] = new @ new.swapaxes(1, 2)
     target = np.concatenate([np.tile(own @ right, (len(shapes), 1)), new @ right], axis=1)
-    inverse = np.linalg.pinv(normal, rcond=1e-10, hermitian=True)
-    taken = target[:, None, :] @ inverse @ target[:, :, None]
+    solved = np.linalg.pinv(normal, rcond=1e-10, hermitian=True)
+    taken = target[:, None, :] @ solved @ target[:, :, None]
     return np.asarray(right @ right - taken[:, 0, 0])
 
 
@@ -336,7 +337,7 @@ def _unattenuated(rows: _Rows, fit: _Fit) -> _Fit:
     inner, cross = rows.covariance[:, 1:, 1:], rows.covariance[:, 1:, 0]
     several = (shapes, inner, np.conj(shapes), w)
     noise = np.einsum("gbk,bkl,hbl,b->gh", *several, optimize=True).real
-    if not np.linalg.eigvals(_inverse(normal) @ noise).real.max() < _CONFIG.attenuated:
+    if not np.linalg.eigvals(inverse(normal, _CONFIG.rank) @ noise).real.max() < _CONFIG.attenuated:
         return fit
     right = ((columns * w) @ np.conj(rows.torque)).real
     right -= np.einsum("gbk,bk,b->g", shapes, cross, w, optimize=True).real
@@ -354,7 +355,7 @@ def _drawn(rows: _Rows, fit: _Fit) -> list[Complex]:
     ]
     every = np.stack((*moved, *_shapes(rows, fit)))
     columns = (every * rows.acceleration).sum(axis=2) / fit.spread
-    covariance = _inverse((columns @ np.conj(columns.T)).real)
+    covariance = inverse((columns @ np.conj(columns.T)).real, _CONFIG.rank)
     size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     correlation, mean = covariance / np.outer(size, size), np.zeros(len(size))
     rng = np.random.default_rng(0)
@@ -363,13 +364,6 @@ def _drawn(rows: _Rows, fit: _Fit) -> list[Complex]:
         _impedance(rows, replace(fit, shape=fit.shape + one[:count], gains=fit.gains + one[count:]))
         for one in about
     ]
-
-
-def _inverse(normal: Array) -> Array:
-    """Of a symmetric matrix whose rows have different units."""
-    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    both = np.outer(size, size)
-    return np.asarray(np.linalg.pinv(normal / both, rcond=1e-12, hermitian=True) / both)
 
 
 def _impedance(rows: _Rows, fit: _Fit) -> Complex:

@@ -31,7 +31,8 @@ from pipelines.frequency.config import RationalConfig
 from pipelines.frequency.spectra import Array, Complex
 from pipelines.io.results import NOT_STORED
 
-__all__ = ["FEWEST", "Known", "Mode", "Rational", "fit_rational", "scattered"]
+__all__ = ["FEWEST", "Known", "Mode", "Rational", "fit_rational", "inverse"]
+__all__ += ["scattered"]
 
 _CONFIG = RationalConfig()
 FEWEST = _CONFIG.fewest  # numerics: bins of a fit at least
@@ -198,7 +199,7 @@ def scattered(model: Rational, frequency: Array, responses: Complex, variance: A
     free = np.diag(model.covariance) > 0.0
     own = np.ascontiguousarray(slope[free])
     rest = (responses[:, np.isfinite(variance)] - data.target) * data.weight
-    steps = (np.conj(own) @ rest.T).real.T @ _inverse(_normal(own, np.ones(len(data.s))))
+    steps = (np.conj(own) @ rest.T).real.T @ inverse(_normal(own, np.ones(len(data.s))))
     covariance = np.zeros_like(model.covariance)
     covariance[np.ix_(free, free)] = np.cov(steps.T)
     return replace(model, covariance=covariance)
@@ -313,11 +314,11 @@ def _normal(slope: Complex, w: Array) -> Array:
     return np.asarray((both * np.repeat(w, 2)) @ both.T)
 
 
-def _inverse(normal: Array) -> Array:
-    """Of a symmetric matrix whose rows have different units."""
+def inverse(normal: Array, rank: float = 1e-14) -> Array:
+    """Return that of a symmetric matrix whose rows have different units."""
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     both = np.outer(scale, scale)
-    return np.asarray(np.linalg.pinv(normal / both, rcond=1e-14, hermitian=True) / both)
+    return np.asarray(np.linalg.pinv(normal / both, rcond=rank, hermitian=True) / both)
 
 
 def _judged(data: _Data, model: Rational) -> Rational:
@@ -337,7 +338,7 @@ def _judged(data: _Data, model: Rational) -> Rational:
         return model  # poles on a measured frequency, or beyond all numbers: no shorter description
     wider = data.correlated * max(misfit, 1.0) * (1.0 + 2.0 / data.freedom)
     covariance = np.zeros((len(free), len(free)))
-    covariance[np.ix_(free, free)] = _inverse(normal) * wider
+    covariance[np.ix_(free, free)] = inverse(normal) * wider
     description = cost / data.correlated + count * float(np.log(2.0 * data.independent))
     return replace(model, covariance=covariance, misfit=misfit, description=description)
 
