@@ -316,7 +316,7 @@ def table_of_document(document: Any, source: str) -> RawTable:
 def _array(value: Any) -> Anything | None:
     """Return an array of numbers or of texts; None of anything else."""
     if isinstance(value, np.ndarray):
-        return value if value.dtype.kind in "fiubcUOS" else None
+        return value if value.dtype.kind != "V" else None  # records
     if isinstance(value, str | int | float):
         return np.array(value) if not isinstance(value, int) or abs(value) < 2**63 else None
     if not isinstance(value, list):

@@ -153,34 +153,29 @@ def jitter(s: Subject) -> list[Check]:
 
 
 def band(s: Subject) -> list[Check]:
-    """T09: the motion is sampled at least ten times in its own period."""
-    rate = f"a rate of {1.0 / s.log.sample_time:.4g} Hz"
+    """T09: the motion is sampled at least ten times in its own period.
+
+    With c_k the correlation of the steps of q at a distance of k samples, motion at f gives
+    c1 = cos(2π f / fs), white noise -1/2. Ten samples a period is c1 = 0.81; noise differs from
+    fast motion by c2, to which it does not contribute.
+    """
+    rate, found = f"a rate of {1.0 / s.log.sample_time:.4g} Hz", []
     words = f"{rate} is too low for this motion: fewer than ten samples in its period"
     remedy = "record faster; ten times the highest frequency at least"
-    joints = range(s.log.n_joints) if s.log.experiment != "frf" else ()
-    slow = (j for j in joints if _undersampled(s, j))
-    found = [s.say("T09", "reject", words, remedy, signal="q", joint=j) for j in slow]
+    for j in range(s.log.n_joints) if s.log.experiment != "frf" else ():
+        q, described = s.position[:, j], s.log.robot.joints[j].encoder_resolution
+        step = s.good.steps[j] or described or 0.0
+        even = np.abs(np.diff(s.good.log.t) / s.log.sample_time - 1.0) < CONFIG.even
+        even &= np.isfinite(np.diff(q)) & ~s.good.jumped[1:, j]
+        d = np.where(even, np.diff(q), 0.0)
+        power = float(d @ d)
+        if power <= d.size * (5.0 * step) ** 2 or s.travel[j] < 100.0 * step:
+            continue
+        c1, c2 = float(d[1:] @ d[:-1]) / power, float(d[2:] @ d[:-2]) / power
+        fast = c1 < CONFIG.band and c2 < min(CONFIG.band_next, c1)
+        if fast or c1 < CONFIG.alternating:
+            found.append(s.say("T09", "reject", words, remedy, signal="q", joint=j))
     return found or s.ok("T09", f"{rate} resolves the motion", signal="q")
-
-
-def _undersampled(s: Subject, joint: int) -> bool:
-    """Return whether the steps of q are too unlike each other.
-
-    With c_k their correlation at a distance of k samples, motion at f gives c1 = cos(2π f / fs),
-    white noise -1/2. Ten samples a period is c1 = 0.81; noise differs from fast motion by c2, to
-    which it does not contribute.
-    """
-    q, described = s.position[:, joint], s.log.robot.joints[joint].encoder_resolution
-    step = s.good.steps[joint] or described or 0.0
-    even = np.abs(np.diff(s.good.log.t) / s.log.sample_time - 1.0) < CONFIG.even
-    even &= np.isfinite(np.diff(q)) & ~s.good.jumped[1:, joint]
-    d = np.where(even, np.diff(q), 0.0)
-    power = float(d @ d)
-    if power <= d.size * (5.0 * step) ** 2 or s.travel[joint] < 100.0 * step:
-        return False
-    c1, c2 = float(d[1:] @ d[:-1]) / power, float(d[2:] @ d[:-2]) / power
-    fast = c1 < CONFIG.band and c2 < min(CONFIG.band_next, c1)
-    return fast or c1 < CONFIG.alternating
 
 
 ORDER_CHECKS = (order, repeated_stamps)  # of a clock that never runs forward nothing else is known

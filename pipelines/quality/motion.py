@@ -184,53 +184,41 @@ def _elsewhere(
     near, k = min(((fits[j, k][0], k) for i, k in fits if i == j != k), default=(np.inf, j))
     # where joint k follows its own reference, that of joint j is only like it
     mixed = near <= CONFIG.others and not (in_scale and fits[k, k][0] <= CONFIG.others)
-    limit = _torque_at_top(s.good.log.tau[: s.good.end, j])
-    level: Level = "reject" if away > CONFIG.away and limit is None else "warn"
-    if mixed and limit is None:
+    # The limit at which a torque is for a good part of the time; a wave is longer near its crest
+    # than on it.
+    size = np.abs(s.good.log.tau[: s.good.end, j])
+    size = size[np.isfinite(size) & (size > 0.0).any()]
+    top = float(size.max(initial=0.0))
+    there = float(np.mean(size >= CONFIG.at_limit * top)) if size.size else 0.0
+    crest = float(np.mean(size >= 0.9 * top)) - there if size.size else 0.0
+    limited = there > max(CONFIG.at_top, crest)
+    level: Level = "reject" if away > CONFIG.away and not limited else "warn"
+    if mixed and not limited:
         words = f"position of joint {j + 1} follows the reference of joint {k + 1}, within "
         words += f"{percent(near, 2)} of it, and not its own: their columns are mixed up"
         remedy = f"in the map of the import, take the position of joint {k + 1} from where that of "
         remedy += f"joint {j + 1} comes from, or reorder the references; look at torques as well"
         return s.say("S13", level, words, remedy, True, signal="q", joint=j)
-    if in_scale and limit is None:
-        unit, remedy = _unit_of_scale(s, j, scale)
+    if in_scale and not limited:
         words = f"position of joint {j + 1} is {scale:.3g} times its reference, within "
-        words += f"{percent(rest, 2)} of it{unit}"
+        words += f"{percent(rest, 2)} of it"
+        remedy = "correct the gear ratio, the direction or the counts per turn of this encoder; if "
+        remedy += "the position is right, the scale of the reference"
+        for large, small, times in (("q", "q_ref", scale), ("q_ref", "q", 1.0 / scale)):
+            degrees = abs(np.deg2rad(times) - 1.0) < CONFIG.proportional
+            if s.log.robot.joints[j].revolute and degrees:
+                words += f": {large} looks like degrees, declared in rad"
+                remedy = f'declare the unit "deg" of {large}; or, if {small} was converted to rad '
+                remedy += "twice, undo that"
         return s.say("S15", level, words, remedy, True, signal="q", joint=j)
-    words = (
-        f"position and reference differ by {percent(away, 2)} of the motion: they are not of the "
-    )
-    words += "same run, or not of the same joint"
-    remedy = "log both in one recorder, or leave the reference out"
-    if limit is not None:
-        words = f"position and reference differ by {percent(away, 2)} of the motion: the torque is "
-        words += f"at ±{limit:.3g} {s.unit('tau', j)}, and the joint cannot follow"
+    words = f"position and reference differ by {percent(away, 2)} of the motion: "
+    if limited:
+        words += f"the torque is at ±{top:.3g} {s.unit('tau', j)}, and the joint cannot follow"
         remedy = "look for what limits the drive, or drive it more gently"
+    else:
+        words += "they are not of the same run, or not of the same joint"
+        remedy = "log both in one recorder, or leave the reference out"
     return s.say("S16", level, words, remedy, True, signal="q_ref", joint=j)
-
-
-def _unit_of_scale(s: Subject, j: int, scale: float) -> tuple[str, str]:
-    """Return which unit makes joint `j` move `scale` times its reference, and the remedy."""
-    for large, small, times in (("q", "q_ref", scale), ("q_ref", "q", 1.0 / scale)):
-        degrees = abs(np.deg2rad(times) - 1.0) < CONFIG.proportional
-        if s.log.robot.joints[j].revolute and degrees:
-            remedy = (
-                f'declare the unit "deg" of {large}; or, if {small} was converted to rad twice, '
-            )
-            return f": {large} looks like degrees, declared in rad", remedy + "undo that"
-    remedy = "correct the gear ratio, the direction or the counts per turn of this encoder; if the "
-    return "", remedy + "position is right, the scale of the reference"
-
-
-def _torque_at_top(tau: Array) -> float | None:
-    """Return the limit at which a torque (samples,) is for a good part of the time, or None."""
-    size = np.abs(tau[np.isfinite(tau)])
-    top = float(size.max(initial=0.0))
-    if top == 0.0:
-        return None
-    there = float(np.mean(size >= CONFIG.at_limit * top))
-    near = float(np.mean(size >= 0.9 * top)) - there  # a wave is longer near its crest than on it
-    return top if there > max(CONFIG.at_top, near) else None
 
 
 MOTION_CHECKS = (limits, held_joints, follows_reference, stopped, direction)

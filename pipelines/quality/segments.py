@@ -272,6 +272,7 @@ def spikes(x: Array, smooth: bool, floor: Array) -> Mask:
         floor: (joints,) smaller ones are left alone.
     """
     found = np.zeros(x.shape, dtype=bool)
+    around = np.concatenate([np.arange(-29, -4), np.arange(5, 30)])
     for width in (1, 2):
         reach = 2 * width
         if len(x) < 40 * width:
@@ -293,7 +294,12 @@ def spikes(x: Array, smooth: bool, floor: Array) -> Mask:
         glitch = off > np.maximum(CONFIG.glitch * np.quantile(off, 0.99, axis=0), floor)
         glitch &= kink > CONFIG.glitch_alone * off
         glitch &= np.maximum(np.abs(left - right), spread) < CONFIG.glitch_sides * off
-        found[at] |= glitch & _above_surroundings(off, glitch)
+        # and four times what 90 % of the 50 samples around it are
+        row, column = np.nonzero(glitch)
+        beside = np.clip(row[:, None] + around, 0, len(off) - 1)
+        usual = np.quantile(off[beside, column[:, None]], 0.9, axis=1) if row.size else 0.0
+        glitch[row, column] = off[row, column] > CONFIG.glitch * usual
+        found[at] |= glitch
     return found
 
 
@@ -303,18 +309,6 @@ def _median_of_four(a: Array, b: Array, c: Array, d: Array) -> Array:
     low = np.maximum(np.minimum(a, b), np.minimum(c, d))
     high = np.minimum(np.maximum(a, b), np.maximum(c, d))
     return np.asarray((low + high) / 2.0)
-
-
-def _above_surroundings(off: Array, candidate: Mask) -> Mask:
-    """Return where a candidate is 4 times what 90 % of the 50 samples around it are."""
-    row, column = np.nonzero(candidate)
-    beside = np.concatenate([np.arange(-29, -4), np.arange(5, 30)])
-    around = off[np.clip(row[:, None] + beside, 0, len(off) - 1), column[:, None]]
-    result = np.zeros_like(candidate)
-    if row.size:
-        usual = np.quantile(around, 0.9, axis=1)
-        result[row, column] = off[row, column] > CONFIG.glitch * usual
-    return result
 
 
 def torque_limit(log: ExperimentLog) -> Array:
