@@ -1,8 +1,8 @@
 """Say what is wrong, where, and what to do about it: one family of errors with stable codes.
 
-Every error a user can meet is one of four kinds, and the kind decides the exit code (cli-contract): wrong usage (2),
-rejected input (3), nothing matched (5), environment (6). The code names the row of the table of bad inputs, so that
-a message can be searched for and a test can ask for exactly it.
+Every error a user can meet is one of four kinds, and the kind decides the exit code (cli-contract):
+wrong usage (2), rejected input (3), nothing matched (5), environment (6). The code names the row of
+the table of bad inputs, so that a message can be searched for and a test can ask for exactly it.
 """
 
 from __future__ import annotations
@@ -14,39 +14,71 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
 
-__all__ = ["Check", "EnvironmentFault", "Gathering", "InputRejected", "Interrupted", "Level", "NothingMatched", "RrridError",
-           "UsageError", "clean", "did_you_mean", "escaped"]
+__all__ = [
+    "Check",
+    "EnvironmentFault",
+    "Gathering",
+    "InputRejected",
+    "Interrupted",
+    "Level",
+    "NothingMatched",
+    "RrridError",
+    "UsageError",
+    "clean",
+    "did_you_mean",
+    "escaped",
+]
 
 Level = Literal["ok", "warn", "repair", "reject"]
 
-# C0 and C1 control characters, tab and newline apart: a terminal obeys them, so no text of a log may carry them out.
+# C0 and C1 control characters, tab and newline apart: a terminal obeys them, so no text of a log
+# may carry them out.
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 
 
 def clean(text: object, limit: int | None = 400) -> str:
-    """Return `text` in a printable line of at most `limit` characters (None: all of it), without control characters."""
+    """Return `text` in a printable line without control characters.
+
+    Args:
+        limit: characters at most; None: all of it.
+    """
     line = " ".join(_CONTROL.sub("", str(text).encode("utf-8", "replace").decode("utf-8")).split())
     if limit is None or len(line) <= limit:
         return line
-    words, _, last = line[: limit - 1].rpartition(" ")  # no word is cut, but one that is half of the text
+    words, _, last = line[: limit - 1].rpartition(
+        " "
+    )  # no word is cut, but one that is half of the text
     return f"{words} …" if len(last) < limit // 2 else f"{line[: limit - 1]}…"
 
 
 def escaped(path: object) -> str:
     """`path` as one printable line that still names it: control characters as \\x1b."""
     text = str(path).encode("utf-8", "backslashreplace").decode("utf-8")
-    return re.sub(rf"{_CONTROL.pattern}|[\t\n]", lambda found: found[0].encode("unicode_escape").decode(), text)
+    return re.sub(
+        rf"{_CONTROL.pattern}|[\t\n]",
+        lambda found: found[0].encode("unicode_escape").decode(),
+        text,
+    )
 
 
 def did_you_mean(word: str, known: Iterable[str], most: int = 1, near_by: float = 0.6) -> str:
-    """A hint such as ", did you mean 'torque'?", with at most so many names; an empty string where nothing known is near.
+    """Return a hint such as ", did you mean 'torque'?", empty where nothing known is near.
 
     Args:
         near_by: ratio of Ratcliff and Obershelp from which a name is near; 1: the same word.
     """
-    bare = {name.lstrip("-"): name for name in known}  # what every option begins with makes no two of them alike
-    near = [f"'{bare[name]}'" for name in difflib.get_close_matches(word.lstrip("-"), list(bare), n=most, cutoff=near_by)]
-    return f", did you mean {' or '.join(filter(None, (', '.join(near[:-1]), near[-1])))}?" if near else ""
+    bare = {
+        name.lstrip("-"): name for name in known
+    }  # what every option begins with makes no two of them alike
+    near = [
+        f"'{bare[name]}'"
+        for name in difflib.get_close_matches(word.lstrip("-"), list(bare), n=most, cutoff=near_by)
+    ]
+    return (
+        f", did you mean {' or '.join(filter(None, (', '.join(near[:-1]), near[-1])))}?"
+        if near
+        else ""
+    )
 
 
 class RrridError(Exception):
@@ -66,7 +98,9 @@ class RrridError(Exception):
         self.message = clean(message)
         self.where = clean(where)
         self.remedy = clean(remedy)
-        self.others: tuple[RrridError, ...] = ()  # of the same work, found in parts that do not depend on this one
+        self.others: tuple[
+            RrridError, ...
+        ] = ()  # of the same work, found in parts that do not depend on this one
         super().__init__(str(self))
 
     def __str__(self) -> str:
@@ -78,7 +112,12 @@ class RrridError(Exception):
         return (_rebuild, (type(self), self.code, self.message, self.where, self.remedy))
 
     def as_dict(self) -> dict[str, Any]:
-        return {"code": self.code, "where": self.where, "message": self.message, "remedy": self.remedy}
+        return {
+            "code": self.code,
+            "where": self.where,
+            "message": self.message,
+            "remedy": self.remedy,
+        }
 
 
 def _sentence(text: str) -> str:
@@ -87,21 +126,28 @@ def _sentence(text: str) -> str:
 
 
 def _capital(text: str) -> str:
-    """`text` with a capital at its beginning, unless its first word is a name, an option or a value: h5, rrrid, --out."""
+    """`text` with a capital, unless its first word is a name, an option or a value: h5, --out."""
     first = text.split()[0].rstrip(",.:;")
-    return text if first == "rrrid" or not (first.isalpha() and first.islower()) else text[0].upper() + text[1:]
+    return (
+        text
+        if first == "rrrid" or not (first.isalpha() and first.islower())
+        else text[0].upper() + text[1:]
+    )
 
 
-def _rebuild(kind: type[RrridError], code: str, message: str, where: str, remedy: str) -> RrridError:
+def _rebuild(
+    kind: type[RrridError], code: str, message: str, where: str, remedy: str
+) -> RrridError:
     return kind(code.removeprefix("RRID-"), message, where=where, remedy=remedy)
 
 
 @dataclass(frozen=True)
 class Check:
-    """One named check of an input and what it found: the same words as an error, but the work goes on.
+    """One named check of an input and what it found, in the words of an error; the work goes on.
 
-    "warn" continues, "repair" continues on data that had to be mended (an error under --strict), "reject" is what
-    the same input costs when a stage other than the doctor meets it. `gate` marks what --check answers with exit 1.
+    "warn" continues, "repair" continues on data that had to be mended (an error under --strict),
+    "reject" is what the same input costs when a stage other than `inspect` meets it. `gate` marks
+    what --check answers with exit 1.
     """
 
     code: str  # with prefix: "RRID-T05"
@@ -112,16 +158,32 @@ class Check:
     gate: bool = False
 
     @staticmethod
-    def of(code: str, level: Level, message: str, where: object = "", remedy: str = "", *, gate: bool = False) -> Check:
-        """A check from a bare row name ("T05"), its texts made printable."""
+    def of(
+        code: str,
+        level: Level,
+        message: str,
+        where: object = "",
+        remedy: str = "",
+        *,
+        gate: bool = False,
+    ) -> Check:
+        """Return a check of a bare row name ("T05"), its texts made printable."""
         return Check(f"RRID-{code}", level, clean(message), clean(where), clean(remedy), gate)
 
     def as_dict(self) -> dict[str, object]:
-        return {"code": self.code, "level": self.level, "where": self.where, "message": self.message,
-                "remedy": self.remedy, "gate": self.gate}
+        return {
+            "code": self.code,
+            "level": self.level,
+            "where": self.where,
+            "message": self.message,
+            "remedy": self.remedy,
+            "gate": self.gate,
+        }
 
     def as_error(self) -> InputRejected:
-        return InputRejected(self.code.removeprefix("RRID-"), self.message, where=self.where, remedy=self.remedy)
+        return InputRejected(
+            self.code.removeprefix("RRID-"), self.message, where=self.where, remedy=self.remedy
+        )
 
 
 class UsageError(RrridError):
@@ -149,14 +211,14 @@ class EnvironmentFault(RrridError):
 
 
 class Gathering:
-    """Collect the errors of parts that do not depend on each other, and raise them together: the first, with the others."""
+    """Collect the errors of independent parts, and raise the first with the others."""
 
     def __init__(self) -> None:
         self.found: list[RrridError] = []
 
     @contextmanager
     def part(self) -> Iterator[None]:
-        """Keep the error of a part instead of raising it: of usage or input; any other ends the work."""
+        """Keep an error of usage or input instead of raising it; any other ends the work."""
         try:
             yield
         except (UsageError, InputRejected) as problem:
@@ -174,8 +236,8 @@ class Gathering:
 class Interrupted(KeyboardInterrupt):
     """A signal ended the work; nothing half written is left.
 
-    Not of the family above: who catches an RrridError, to note what is wrong with one file and go on, must not catch
-    the user's wish to stop.
+    Not of the family above: who catches an RrridError, to note what is wrong with one file and go
+    on, must not catch the user's wish to stop.
     """
 
     def __init__(self, signal_number: int) -> None:
@@ -183,7 +245,9 @@ class Interrupted(KeyboardInterrupt):
         self.exit_code = 128 + signal_number
 
     def as_error(self) -> RrridError:
-        """The same in the words of every other error."""
-        told = RrridError("P06", "interrupted", remedy="run the same command again; nothing was half written")
+        """Return the same in the words of every other error."""
+        told = RrridError(
+            "P06", "interrupted", remedy="run the same command again; nothing was half written"
+        )
         told.exit_code = self.exit_code
         return told
