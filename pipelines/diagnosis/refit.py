@@ -365,9 +365,23 @@ class Later:
         return share * np.array([float(np.linalg.norm(y)) for y in self.rows.y])
 
     def slight(self, torque: Sequence[Array]) -> bool:
-        """Return whether torque is as small as healthy machines have some, at every joint."""
-        each = zip(torque, self.usual, strict=True)
-        return all(float(np.linalg.norm(x)) <= own for x, own in each)
+        """Return whether torque is as small as healthy machines have some, at every joint.
+
+        What nominal numbers imitate of it does not count.
+        """
+        usual = self.usual
+        if not usual.any():
+            return False
+        nominal = self.base.take(np.arange(self.prior.n_nominal))
+        part = nominal.times(self._nominal_inverse @ nominal.moments(torque))
+        each = zip(torque, part, usual, strict=True)
+        return all(float(np.linalg.norm(x - own)) <= least for x, own, least in each)
+
+    @cached_property
+    def _nominal_inverse(self) -> Array:
+        """(nominal, nominal) of the products of the nominal columns."""
+        n = self.prior.n_nominal
+        return np.asarray(np.linalg.pinv(self.gram[:n, :n], RIDGE, hermitian=True))
 
     def form(self, group: Group) -> Effect:
         """Return the first law of a candidate, in the shape that was screened."""
