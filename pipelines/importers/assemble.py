@@ -20,19 +20,11 @@ from pipelines.importers import patterns
 from pipelines.importers.clock import time_of
 from pipelines.importers.config import RECIPE
 from pipelines.importers.raw import RawTable, expand
-from pipelines.importers.recipe import (
-    FileSpec,
-    Recipe,
-    TableSpec,
-    TimeSpec,
-    find_recipe,
-    parse_recipe,
-)
+from pipelines.importers.recipe import FileSpec, Recipe, TableSpec, find_recipe, parse_recipe
 from pipelines.importers.repair import Recording
 from pipelines.importers.tables import read_table
 from pipelines.importers.units import drive_of, si_of, unit_declared
 from pipelines.io.files import RECORDINGS
-from pipelines.io.log import Array
 from pipelines.io.robot import Drive, RobotDescription, parse_robot, shipped, shipped_names
 from pipelines.io.robot_files import load_robot, split_tip
 from pipelines.io.sandbox import read_small_text
@@ -201,18 +193,17 @@ def _robot(
             remedy = f"beside use, {', '.join(_BESIDE_USE)} can be given"
             remedy += "; write the rest in the description"
             raise UsageError("C01", message, where=path, remedy=remedy)
-    tip, gravity = table.get("tip_link"), table.get("gravity", (0.0, 0.0, 0.0))
-    if not isinstance(tip, str | None):
-        message, remedy = "'robot.tip_link' must name a link", 'write tip_link = "last link"'
-        raise UsageError("C02", message, where=path, remedy=remedy)
-    if not isinstance(use, str) or not use.strip():
-        message = "'robot.use' must name a robot description, a URDF, or a shipped robot"
-        raise UsageError("C02", message, where=path, remedy="fill it in")
-    vector = isinstance(gravity, list | tuple) and len(gravity) == len("xyz")
-    if not vector or not all(isinstance(g, int | float) for g in gravity):
-        message = f"'robot.gravity' is {gravity}, must be three numbers [m/s^2]"
-        remedy = "write gravity = [0.0, 0.0, -9.81]"
-        raise UsageError("C02", message, where=path, remedy=remedy)
+    tip, gravity = table.get("tip_link"), table.get("gravity", [0.0, 0.0, 0.0])
+    numbers = isinstance(gravity, list) and all(isinstance(g, int | float) for g in gravity)
+    for key, value, right, what in (
+        ("use", use, isinstance(use, str) and bool(use.strip()), "a description, URDF, or robot"),
+        ("tip_link", tip, isinstance(tip, str | None), 'a link: tip_link = "last link"'),
+        ("gravity", gravity, numbers and len(gravity) == len("xyz"),
+         "three numbers [m/s^2]: gravity = [0.0, 0.0, -9.81]"),
+    ):  # fmt: skip
+        if not right:
+            message, remedy = f"'robot.{key}' is {value!r}, must be {what}", "correct the value"
+            raise UsageError("C02", message, where=path, remedy=remedy)
     use, after_colon = split_tip(use)
     places = dict.fromkeys((folder, path.parent))
     found = next((place / use for place in places if (place / use).is_file()), None)
@@ -223,10 +214,8 @@ def _robot(
         remedy = "copy it to the recordings, give their folder with --source, or another robot"
         raise UsageError("C04", message, where=path, remedy=f"{remedy} with --robot")
     robot = load_robot(found if found is not None else use, tip or after_colon)
-    robot = replace(robot, name=str(table.get("name", robot.name)))
-    if "gravity" in table:
-        x, y, z = map(float, gravity)
-        robot = replace(robot, gravity=(x, y, z))
+    x, y, z = map(float, gravity if "gravity" in table else robot.gravity)
+    robot = replace(robot, name=str(table.get("name", robot.name)), gravity=(x, y, z))
     return robot, () if found is None else (found,)
 
 
@@ -309,7 +298,11 @@ def assemble(
         clocked, t = own and time.column is not None, np.full(table.rows.size, np.nan)
         with problems.part():
             if own:
-                t = _time(table, time, assume_units, undeclared, checks)
+                if time.unit is None and len(time.parts) == 1:
+                    of_t = table.units.get(table.name_of(time.parts[0][0], "t"))
+                    undeclared += [f"t: unit {of_t} from the header"] if of_t else []
+                t, said = time_of(table, time, assume_units)
+                checks += said
         if problems.found:
             continue
         x = {s: np.column_stack([table.columns[name] for name in columns[s]]) for s in here}
@@ -328,18 +321,6 @@ def assemble(
         remedy = "add [resample] rate = … to bring them on one clock"
         raise InputRejected("T06", message, where=where, remedy=remedy)
     return Assembled(parts, units, columns, tuple(checks), tuple(undeclared))
-
-
-def _time(
-    table: RawTable, spec: TimeSpec, assume: bool, undeclared: list[str], checks: list[Check]
-) -> Array:
-    """Return the time stamps [s] of a file, and note where their unit comes from."""
-    if spec.unit is None and len(spec.parts) == 1:
-        header = table.units.get(table.name_of(spec.parts[0][0], "t"))
-        undeclared += [f"t: unit {header} from the header"] if header else []
-    t, said = time_of(table, spec, assume)
-    checks += said
-    return t
 
 
 def _begun(part: Recording, begin: float, checks: list[Check]) -> Recording:
