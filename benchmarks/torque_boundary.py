@@ -27,9 +27,9 @@ import numpy.typing as npt
 from benchmarks.hidden_effects.table import wilson
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.config import BoundaryConfig
+from pipelines.estimation.checks.joint_rows import sample_motion
 from pipelines.io.log import ExperimentLog, Signal
 from pipelines.io.robot import Joint, LinkParameters, RobotDescription, format_robot
-from pipelines.model.row_fit import sample_motion
 from pipelines.quality.subject import Subject
 
 Array = npt.NDArray[np.float64]

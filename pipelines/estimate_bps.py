@@ -17,6 +17,7 @@ from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
 from pipelines.estimation.balance import power_balance
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
+from pipelines.estimation.checks.plausibility import mismatches
 from pipelines.estimation.comparison import averaged, compare, residuals
 from pipelines.estimation.consistency import consistency
 from pipelines.estimation.estimate import (
@@ -50,7 +51,6 @@ from pipelines.io.model_file import (
 from pipelines.io.option import option
 from pipelines.io.results import encode
 from pipelines.io.schema import joint_unit
-from pipelines.model.plausibility import mismatches
 from pipelines.quality.checks import Subject, accepted
 from pipelines.report.bps_report import bps_report
 from pipelines.report.report import Report

@@ -19,12 +19,12 @@ import numpy as np
 from pipelines.errors import Check, Level, RrridError
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
+from pipelines.estimation.checks.plausibility import plausibility_findings
 from pipelines.io.files import Opened
 from pipelines.io.log import ExperimentLog, recording
 from pipelines.io.option import option
 from pipelines.io.robot import RobotDescription, format_robot
 from pipelines.io.schema import joint_unit
-from pipelines.model.plausibility import plausibility_findings
 from pipelines.quality.checks import NotTested, Subject, check_together, columns_first, findings
 from pipelines.quality.config import CONFIG
 from pipelines.quality.segments import quantum

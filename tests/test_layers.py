@@ -21,7 +21,6 @@ LAYERS = {
     "pipelines.dynamics.arm": 6.5, "pipelines.dynamics.draw": 6.6, "pipelines.dynamics.named_cause": 6.6, "pipelines.dynamics.parameter_names": 6.5,
     "pipelines.estimation": 6.7, "pipelines.estimation.residual_analysis": 8,
     "pipelines.simulation": 6.8, "pipelines.simulation.comparison": 7.5,
-    "pipelines.model": 7,
     "pipelines.friction": 8.5, "pipelines.frequency": 8.5, "pipelines.writing": 9, "pipelines.excitation": 10,
     "pipelines.estimation.checks": 9,
     "pipelines.estimation.result": 10, "pipelines.diagnosis": 11,
@@ -169,7 +168,7 @@ def test_the_bench_works_without_the_model() -> None:
     """With everything of ours but log/ and errors out of reach, it still records a log of a sick machine."""
     code = """
 import sys
-for name in ("model", "dynamics", "simulation", "estimation", "report", "stage"):
+for name in ("dynamics", "simulation", "estimation", "report", "stage"):
     sys.modules[f"pipelines.{name}"] = None
 from bench.draw import draw_machine
 from bench.experiments import excitation

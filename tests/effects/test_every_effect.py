@@ -25,7 +25,7 @@ UNITS = {"1", "1/rev", "Hz", "s", "s/rad", "rad", "rad/s", "m", "kg", "kg m", "k
 REPO = Path(__file__).resolve().parents[2]
 # Where names of effects stand all the same: the laws among which friction is fitted and their report, the nominal model, what a
 # frequency response tells apart without any motion, and the forms of other programs, which have terms of their own.
-MAY_NAME = ("pipelines/model/friction/", "pipelines/report/friction_report.py", "pipelines/model/estimation/nominal.py",
+MAY_NAME = ("pipelines/friction/", "pipelines/report/friction_report.py", "pipelines/estimation/nominal.py",
             "pipelines/frequency/", "pipelines/export/")
 NOMINAL = {"coulomb", "viscous", "two_sigmoid", "three_sigmoid"}  # laws that a nominal model has
 FOLDER = REPO / "pipelines" / "effects"

@@ -12,11 +12,11 @@ from benchmarks.recorded_estimates import fixed_row_error, kr300, panda
 from benchmarks.uneven_stamps import draw, scores
 from benchmarks.uneven_stamps import estimated as estimated_case
 from pipelines.errors import Check
+from pipelines.estimation.checks.plausibility import plausibility
 from pipelines.import_log import STAGE as IMPORT
 from pipelines.import_log import Settings as ImportSettings
 from pipelines.io.files import open_log
 from pipelines.io.log import ExperimentLog
-from pipelines.model.plausibility import plausibility
 from pipelines.quality.checks import Subject, check_log
 from pipelines.stage import Request, run_stage
 from tests.estimate_bps.test_other_arms import COULOMB, an_arm, deviations, estimated, recorded

@@ -10,16 +10,21 @@ import pytest
 
 from pipelines import estimate_bps
 from pipelines.dynamics.rrr import rigid_body
+from pipelines.estimation.checks import plausibility as plausibility_module
+from pipelines.estimation.checks.clock_offset import Offset, clock_offset
+from pipelines.estimation.checks.joint_rows import (
+    Evidence,
+    quick_residual,
+    relative_residual,
+    row_fits,
+    sample_motion,
+)
+from pipelines.estimation.checks.plausibility import plausibility, plausibility_findings
 from pipelines.estimation.judgements import excitation
 from pipelines.io.files import Opened, open_log
 from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.io.robot import LinkParameters, format_robot
 from pipelines.io.robot_files import load_robot
-from pipelines.model import plausibility as plausibility_module
-from pipelines.model.clock_offset import Offset, clock_offset
-from pipelines.model.evidence import Evidence
-from pipelines.model.plausibility import plausibility, plausibility_findings
-from pipelines.model.row_fit import quick_residual, relative_residual, row_fits, sample_motion
 from pipelines.quality.checks import NotTested, Subject
 from pipelines.stage import Inputs
 from tests.faulty import drifting, healthy_without_reference

@@ -10,8 +10,8 @@ import pytest
 from bench import experiments
 from bench.draw import draw_machine
 from bench.plant import record
+from pipelines.estimation.checks.plausibility import plausibility
 from pipelines.io.log import ExperimentLog
-from pipelines.model.plausibility import plausibility
 from pipelines.quality.checks import Subject
 from tests.healthy import with_signal
 from tests.seeds import seeds

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.rrr import rigid_body
+from pipelines.estimation.checks.joint_rows import Evidence, sample_motion
+from pipelines.estimation.checks.plausibility import _against_the_others as against_the_others
+from pipelines.estimation.checks.plausibility import plausibility
+from pipelines.estimation.checks.torque_scale import torque_scale
 from pipelines.io.files import open_log
 from pipelines.io.log import ExperimentLog
-from pipelines.model.evidence import Evidence
-from pipelines.model.plausibility import _against_the_others as against_the_others
-from pipelines.model.plausibility import plausibility
-from pipelines.model.row_fit import sample_motion
-from pipelines.model.torque_scale import torque_scale
 from pipelines.quality.checks import Subject
 from tests.faulty import healthy_without_reference
 from tests.healthy import good_log, with_signal

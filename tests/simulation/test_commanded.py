@@ -14,8 +14,8 @@ from bench.faults import make
 from bench.plant import record
 from pipelines.errors import InputRejected
 from pipelines.estimation.checks.gates import examined
+from pipelines.estimation.checks.plausibility import mismatches
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.plausibility import mismatches
 from pipelines.quality.subject import Subject
 from pipelines.simulation.commanded import against_command, commanded
 from tests.healthy import with_signal

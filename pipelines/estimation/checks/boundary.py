@@ -19,6 +19,7 @@ from pipelines.dynamics.body import standard_parameters
 from pipelines.estimation.checks.channel_order import SIGNALS, ColumnOrder, search_orders
 from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.estimation.checks.gravity_fit import LOOSE, GravityFit, GravityModel
+from pipelines.estimation.checks.joint_rows import Sampled, sample_motion
 from pipelines.estimation.checks.payload import (
     NOT_TOLD,
     CompensatedPayload,
@@ -38,7 +39,6 @@ from pipelines.estimation.checks.torque_sign import touches_of_zero
 from pipelines.io.log import ExperimentLog
 from pipelines.io.robot import RobotDescription
 from pipelines.io.schema import joint_unit
-from pipelines.model.row_fit import Sampled, sample_motion
 from pipelines.quality.segments import Usable
 from pipelines.quality.subject import Subject
 

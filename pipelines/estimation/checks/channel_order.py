@@ -14,6 +14,7 @@ from itertools import combinations, permutations
 import numpy as np
 
 from pipelines.dynamics.chain import regressor
+from pipelines.estimation.checks.joint_rows import Sampled
 from pipelines.estimation.checks.torque_rows import (
     Array,
     GenericArm,
@@ -22,7 +23,6 @@ from pipelines.estimation.checks.torque_rows import (
     own_columns,
     thinned,
 )
-from pipelines.model.row_fit import Sampled
 
 __all__ = ["SIGNALS", "ColumnOrder", "search_orders"]
 

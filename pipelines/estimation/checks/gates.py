@@ -1,6 +1,6 @@
 """Refuse logs of which a diagnosis makes no sense: columns, signs, scales or clocks mixed up.
 
-    said, boundary = examined(logs)     checks of each log, and what their torque is
+said, boundary = examined(logs)     checks of each log, and what their torque is
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from dataclasses import replace
 from pipelines.errors import Check, InputRejected, NothingMatched
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
+from pipelines.estimation.checks.plausibility import mismatches
 from pipelines.estimation.preparation import Logs
 from pipelines.io.log import ExperimentLog, recording
-from pipelines.model.plausibility import mismatches
 from pipelines.quality.checks import Subject, check_log
 from pipelines.simulation.commanded import against_command
 

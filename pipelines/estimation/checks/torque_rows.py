@@ -24,8 +24,8 @@ import numpy.typing as npt
 from pipelines.dynamics.base_parameters import base_set
 from pipelines.dynamics.chain import regressor
 from pipelines.dynamics.kinematics import SerialChain, serial_chain
+from pipelines.estimation.checks.joint_rows import Sampled
 from pipelines.io.robot import RobotDescription
-from pipelines.model.row_fit import Sampled
 
 __all__ = [
     "CLUSTERS",

@@ -1,1 +1,0 @@
-"""What we believe: the physics of an arm, as NumPy functions of its motion."""
