@@ -8,6 +8,7 @@ from math import pi, sqrt
 from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.perturbation import (
@@ -28,6 +29,10 @@ _NOTHING = 1e-6  # numerics: [N m] that leave the link in the middle of the gap 
 # thousandth of a gap of 6.6 mrad. Those of one shape moved a little, whose difference is a slope,
 # are few: they are worked out exactly.
 _SLOPES = 6  # numerics: shapes worked out exactly at most
+_LENGTH, _EARLY = 600, 400  # numerics: samples of a stretch, and before it
+_FEW, _SHORT = 4, 300  # numerics: gaps whose arrays cost hardly more than a call; samples then
+# Two stretches may differ by this share of the gap; a speed counts as a way in this time [s].
+_SEAM, _TICK = 1e-12, 1e-3  # numerics: rounding; [s]
 
 
 @dataclass(frozen=True)
@@ -57,7 +62,7 @@ class Backlash(Effect):
         return super().possible(values) and values["gap"] > EFFECTS.tight_gap
 
     def several(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> list[Array]:
-        """Gaps of one motor share its forces."""
+        """All gaps are followed at once; those of one motor share its forces."""
         tau, felt = rigid_torque(arm.body, arm.p, motion), _felt(arm, motion.q, self.index)
         motors = list(dict.fromkeys(one.motor_inertia for one in shapes))
         if len(motors) > 1:
@@ -162,33 +167,84 @@ def followed(t: Array, mass: Array, force: Array, gaps: Gaps) -> Array:
     """x (gaps, samples) [rad] of the link against its motor.
 
     Of t (samples,), mass [kg m^2] and force [N m] (gaps, samples), or (1, samples) where they are
-    those of all gaps. Over a sample, trapezoids; flank and film implicit. It begins settled on the
-    flank that the force presses on.
+    those of all gaps. Over a sample, trapezoids; flank and film implicit.
     """
-    steps = np.diff(t).tolist()
-    m, f = ((0.5 * (x[:, 1:] + x[:, :-1])).tolist() for x in (mass, force))
-    out = np.empty((len(gaps.half), len(t)))
-    each = zip(
-        gaps.half.tolist(),
-        gaps.film.tolist(),
-        gaps.stiffness.tolist(),
-        gaps.damping.tolist(),
-        strict=True,
+    length = _SHORT if len(gaps.half) <= _FEW else _LENGTH
+    samples, count = len(t), max(1, -(-(len(t) - 1) // length))
+    h = np.append(np.diff(t), 0.0)
+    m, f = (
+        np.append(0.5 * (x[:, 1:] + x[:, :-1]), np.zeros((len(x), 1)), axis=1)
+        for x in (mass, force)
     )
-    for gap, (half, film, k, d) in enumerate(each):
-        first = float(force[gap % len(force), 0])
-        x, v = half * float(np.sign(first)) + first / k, 0.0
-        found = [x]
-        rows = zip(steps, m[gap % len(m)], f[gap % len(f)], strict=True)
-        for h, inertia, pull in rows:
-            over = x - half if x > half else min(x + half, 0.0)
-            slowing = 0.5 * h * film
-            if (k * over + d * v) * over > 0.0:  # what is not closed does not push
-                slowing += 0.5 * h * d + 0.25 * h * h * k
-                pull = pull - k * over
-            after = (v * (inertia - slowing) + h * pull) / (inertia + slowing)
-            x += 0.5 * h * (v + after)
+    early = np.arange(count) * length - _EARLY
+    steps = early + np.arange(length + _EARLY)[:, None]  # (steps, stretches)
+    within = np.where((steps >= 0) & (steps < samples - 1), steps, samples - 1)
+    inertia = np.where(m > 0.0, m, 1.0)  # outside the log no time goes by
+    start = _start(force[:, np.maximum(early, 0)], gaps)
+    x, v, seams = _moved(h[within], _stretched(inertia, within), _stretched(f, within), start, gaps)
+    for gap, half in enumerate(gaps.half):
+        place, speed = x[-1, gap, 0], v[gap, 0]
+        for k in range(1, count):
+            off = abs(place - x[_EARLY, gap, k]) + _TICK * abs(speed - seams[gap, k])
+            if off > _SEAM * half:
+                own, before = within[_EARLY:, k], (float(place), float(speed))
+                inert, pull = m[gap % len(m), own], f[gap % len(f), own]
+                again = _step_by_step(h[own], inert, pull, before, gaps, gap)
+                x[_EARLY:, gap, k], v[gap, k] = again
+            place, speed = x[-1, gap, k], v[gap, k]
+    along = x[_EARLY + 1 :].transpose(1, 2, 0).reshape(len(gaps.half), -1)
+    return np.concatenate([x[_EARLY, :, :1], along], axis=1)[:, :samples]
+
+
+def _stretched(x: Array, within: npt.NDArray[np.intp]) -> Array:
+    """x (gaps, samples) at `within` (steps, stretches), as (steps, gaps, stretches)."""
+    return np.ascontiguousarray(x[:, within].transpose(1, 0, 2))
+
+
+def _start(force: Array, gaps: Gaps) -> Array:
+    """x (gaps, stretches) settled on the flank that the force presses on."""
+    return np.asarray(gaps.half[:, None] * np.sign(force) + force / gaps.stiffness[:, None])
+
+
+def _moved(h: Array, m: Array, f: Array, x: Array, gaps: Gaps) -> tuple[Array, Array, Array]:
+    """x (steps + 1, gaps, stretches), v (gaps, stretches) at the end, and where a stretch begins.
+
+    Of h (steps, stretches), m and f (steps, gaps, stretches), or one for all gaps.
+    """
+    k, d, half = gaps.stiffness[:, None], gaps.damping[:, None], gaps.half[:, None]
+    h = h[:, None]
+    out, v = np.empty((len(h) + 1, *x.shape)), np.zeros_like(x)
+    out[0], seams = x, v
+    drag, more = 0.5 * h * gaps.film[:, None], 0.5 * h * d + 0.25 * h * h * k
+    given, push, half_step = h * f, h * k, 0.5 * h
+    for i in range(len(h)):
+        over = x - np.minimum(np.maximum(x, -half), half)
+        over *= (k * over + d * v) * over > 0.0  # what is not closed does not push
+        slowing = drag[i] + more[i] * (over != 0.0)
+        after = (v * (m[i] - slowing) + given[i] - push[i] * over) / (m[i] + slowing)
+        x = x + half_step[i] * (v + after)
+        v = after
+        out[i + 1] = x
+        if i + 1 == _EARLY:
+            seams = v
+    return out, v, seams
+
+
+def _step_by_step(
+    h: Array, m: Array, f: Array, start: tuple[float, float], gaps: Gaps, gap: int
+) -> tuple[Array, float]:
+    """x (samples,) of one gap from where the stretch before ended, and the speed at the end."""
+    k, d, half, film = (float(x[gap]) for x in (gaps.stiffness, gaps.damping, gaps.half, gaps.film))
+    x, v = start
+    found = [x]
+    for step, inertia, pull in zip(h.tolist(), m.tolist(), f.tolist(), strict=True):
+        if step:
+            over = x - min(max(x, -half), half)
+            slowing = 0.5 * step * film
+            if (k * over + d * v) * over > 0.0:
+                slowing, pull = slowing + 0.5 * step * d + 0.25 * step * step * k, pull - k * over
+            after = (v * (inertia - slowing) + step * pull) / (inertia + slowing)
+            x += 0.5 * step * (v + after)
             v = after
-            found.append(x)
-        out[gap] = found
-    return out
+        found.append(x)
+    return np.array(found), v
