@@ -11,6 +11,7 @@ import os
 import platform
 import tempfile
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -113,7 +114,7 @@ def _folder(name: str, where: Callable[[], Path], otherwise: Level, remedy: str)
 
 
 def self_test() -> Iterator[Finding]:
-    """Simulate a log, write it, read it, fit it and draw: small jobs whose answers are known."""
+    """Simulate a log, write, read and fit it, filter and draw: small jobs with known answers."""
     from pipelines.simulation.example import example_session
 
     logs: list[ExperimentLog] = []
@@ -130,6 +131,7 @@ def self_test() -> Iterator[Finding]:
             work = partial(_round_trip, Path(folder) / file, logs[0])
             yield _tried(f"{container} log, written and read", work)
         yield _tried("base parameters", partial(_fitted, logs[0]))
+    yield _tried("observer", _observed)
     yield _tried("figure", _drawn)
 
 
@@ -172,6 +174,41 @@ def _fitted(log: ExperimentLog, close: float = 6.0) -> str:
     if not max(away, default=float("nan")) <= close:
         raise ValueError(f"a parameter is {max(away, default=0.0):.1f} std from the truth")
     return f"{len(away)} parameters within {max(away):.1f} std of the truth"
+
+
+def _observed(jerk: float = 500.0, noise: float = 1e-12, close: float = 1e-6) -> str:
+    """Compare the states that the observer finds, over a gap, with those of filterpy's filter.
+
+    Args:
+        jerk: [rad/s^3] std of the jerk.
+        noise: [rad^2] variance of the measurement.
+        close: of the largest value of each state.
+    """
+    import numpy as np
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # filterpy imports parts of SciPy that are going away
+        from filterpy.kalman import KalmanFilter
+    from pipelines.estimation.chain import held_input, transition
+    from pipelines.estimation.state_estimation import Start, design, observe
+
+    step, samples, order = 1e-3, 300, 3
+    y = np.sin(20.0 * step * np.arange(samples))
+    y[100:120] = np.nan
+    mean, covariance = np.zeros(order), np.diag([1e-6, 1.0, 1e3])
+    reach = jerk * held_input(order, np.array([step]))[0]
+    kalman = KalmanFilter(dim_x=order, dim_z=1)
+    kalman.F, kalman.Q = transition(order, np.array([step]))[0], np.outer(reach, reach)
+    kalman.H, kalman.R = np.eye(order)[:1], np.array([[noise]])
+    kalman.x, kalman.P = mean.copy(), covariance.copy()
+    seen = [None if np.isnan(value) else value for value in y]
+    theirs = kalman.batch_filter(seen, update_first=True)[0]
+    start = Start(mean[None], covariance[None])
+    ours = observe(y[:, None], design(step, jerk, noise), start).states[:, :, 0].T
+    away = float(np.max(np.abs(ours - theirs) / np.abs(theirs).max(axis=0)))
+    if not away <= close:
+        raise ValueError(f"the observer differs from filterpy's by {away:.1e}")
+    return f"equal to filterpy's within {away:.0e}"
 
 
 def _drawn() -> str:

@@ -41,7 +41,7 @@ CONTRACT = {f"pipelines.effects{end}" for end in ("", ".base", ".config", ".hook
 FILES = ("pipelines.io", "pipelines.importers")
 DOORS: dict[str, str | tuple[str, ...]] = {
     "typer": "rrrid_cli", "matplotlib": ("pipelines.report", "rrrid"), "jinja2": "pipelines.report", "h5py": FILES,
-    "pandas": (*FILES, "rrrid"), "pyarrow": FILES, "filterpy": "benchmarks.textbook_kalman", "mujoco": ("bench", "pipelines.export"),
+    "pandas": (*FILES, "rrrid"), "pyarrow": FILES, "filterpy": "pipelines.selfcheck", "mujoco": ("bench", "pipelines.export"),
     "pinocchio": "pipelines.export", "yaml": "nobody", "pickle": "nobody", "pydantic": FILES, "pydantic_core": FILES,
     "tomllib": "pipelines.io.sandbox",
     "rich": "rrrid_cli", "pebble": "pipelines.executor", "dask": "pipelines.executor", "distributed": "pipelines.executor",

@@ -22,7 +22,7 @@ def test_this_installation_works(tmp_path: Path) -> None:
     done = rrrid("doctor", "--json", cwd=tmp_path, env={"TMPDIR": str(tmp_path)})
     told = json.loads(done.stdout)
     assert (done.returncode, told["works"]) == (0, True)
-    assert len([one for one in told["findings"] if one["name"].startswith("self-test") and one["level"] == "ok"]) == 5
+    assert len([one for one in told["findings"] if one["name"].startswith("self-test") and one["level"] == "ok"]) == 6
     assert list(tmp_path.iterdir()) == []
 
 
