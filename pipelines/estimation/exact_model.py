@@ -144,7 +144,7 @@ class Exact:
         return self.nominal.extended(*acting)
 
     def torque_in(self, log: int, motion: Motion) -> Array:
-        """(samples, joints) [N m] in log number `log`, less that of the standing effects."""
+        """Return (samples, joints) [N m] in log number `log`, less that of standing effects."""
         arm = self.arm_in(log)
         if not self.standing:
             return arm.torque(motion)
@@ -234,7 +234,7 @@ class Exact:
 
 
 def _added(standing: Sequence[Acting], motion: Motion, arm: ArmModel) -> Array:
-    """(samples, joints) [N m] of effects that just add theirs."""
+    """Return the torque (samples, joints) [N m] of effects that just add theirs."""
     return np.asarray(sum(one.effect.torque(motion, arm, one.values) for one in standing))
 
 

@@ -66,7 +66,7 @@ def condition_number(statistics: Statistics, columns: Sequence[int] | None = Non
 
 
 def _resolved(solution: Solution, inflation: float) -> Flags:
-    """A direction is resolved if its standard deviation is below a third of the whole signal.
+    """Return which directions have a standard deviation below a third of the whole signal.
 
     With columns of unit length a direction's coordinate has the unit of √(Σ w y²), and a standard
     deviation 1/s of a residual of unit variance: a direction in which even a third of all that was

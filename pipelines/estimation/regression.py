@@ -269,7 +269,7 @@ class LogEquations:
         return Rows(out, slow | self._near_peaks(~(out[:, None] | slow)))
 
     def _near_peaks(self, rows: Flags) -> Flags:
-        """(samples, joints) too near to torque beyond its limit; none where nothing spreads it."""
+        """Return which samples are too near to torque beyond its limit; none without a low-pass."""
         good, low_pass = self.found.good, self.conditioning.low_pass
         near = np.zeros_like(rows)
         if low_pass is None:

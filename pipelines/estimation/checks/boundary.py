@@ -53,12 +53,11 @@ __all__ = [
     "torque_boundary",
 ]
 
-STANDARD_GRAVITY = 9.80665  # [m/s^2]
+STANDARD_GRAVITY = 9.80665  # numerics: [m/s^2]
 _MOVING = ("excitation", "free", "writing")
 _AXES = np.concatenate([np.eye(3), -np.eye(3)])
 _ANGLES = np.radians(np.r_[0.1:2.0:0.1, 2.0:20.0:0.5, 20.0:92.0:2.0])
-_FOUR = 4.0  # two standard deviations, squared
-_HELD = 0.02  # of the travel of the joint that moves most: a joint that moves less is held
+_FOUR = 4.0  # numerics: two standard deviations, squared
 
 
 @dataclass(frozen=True)
@@ -216,7 +215,7 @@ def _sampled(usable: Sequence[Usable]) -> list[Sampled]:
 
 
 def _informative(logs: Sequence[ExperimentLog]) -> list[ExperimentLog]:
-    """Logs in which all joints move; those of role "identify" where there are any."""
+    """Return logs in which all joints move; those of role "identify" where there are any."""
     moving = _moving(logs)
     for role in ("identify", "validate", "reference"):
         if of_role := [log for log in moving if log.role == role]:
@@ -338,7 +337,7 @@ class _Estimate:
             self.arm,
             self.motions[:1],
             self.described,
-            np.flatnonzero(travel > _HELD * travel.max()).tolist(),
+            np.flatnonzero(travel > config.held * travel.max()).tolist(),
             config.model_error,
             (config.order_rows, config.orders),
             True if fits.rms > config.lost else False if explained else None,

@@ -28,11 +28,11 @@ __all__ = ["SIGNALS", "ColumnOrder", "search_orders"]
 
 SIGNALS = ("q and tau", "tau", "q")
 _ALL_UP_TO = {"q and tau": 7, "q": 4, "tau": 4}  # joints; of more, orders are reached by exchanges
-_ROUGHLY = 100  # moments that rank orders by one solution, all joints weighed by their torque
-_REFINED = 50  # orders that are compared in full, of those that are ranked
-_BEAM = 8  # orders that are kept at each exchange
-_RIDGE = 1e-9  # of equilibrated columns
-_ROUNDS = 4  # of reweighting, from what each joint by itself leaves
+_ROUGHLY = 100  # numerics: moments that rank orders by one solution
+_REFINED = 50  # numerics: orders that are compared in full, of those that are ranked
+_BEAM = 8  # numerics: orders that are kept at each exchange
+_RIDGE = 1e-9  # numerics: of equilibrated columns
+_ROUNDS = 4  # numerics: of reweighting, from what each joint by itself leaves
 
 
 @dataclass(frozen=True)

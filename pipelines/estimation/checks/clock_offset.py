@@ -26,6 +26,7 @@ from pipelines.io.log import Array
 _CONFIG = PlausibilityConfig()
 _BLOCKS, _ROUNDS = 4, 6  # numerics
 # Student's t for 99.5 % by degrees of freedom: few joints agree by chance more easily than many
+# numerics
 _STUDENT = (np.inf, 63.7, 9.92, 5.84, 4.60, 4.03, 3.71, 3.50)
 
 

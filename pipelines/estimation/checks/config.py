@@ -43,6 +43,18 @@ class BoundaryConfig:
         payload_share: of the torque's RMS, that a payload makes which is looked for.
         no_negative: times the noise of a channel: a torque below minus that is negative.
         touches: times that a signed torque does not come down to zero without crossing it once.
+        near: of the RMS: a torque at zero.
+        far: of the RMS: a torque that is away from zero again.
+        below: of the samples at zero: a magnitude has none below it.
+        standing: of its RMS: a joint that is slower may stand, held by its brake.
+        held: of the travel of the joint that moves most: a joint that moves less is held.
+        loose: [m/s^2] standard deviation of each component of gravity before any data: three times
+            g, so that what no data tell stays finite.
+        periods: of the motion's mean period: length of the filter, which then keeps 4 harmonics.
+        widths: of a joint's RMS speed: where laws of friction bend.
+        clusters: of all moments together.
+        moved_on: of twice the variance: a motion has moved on.
+        returned: of twice the variance: a motion is back.
     """
 
     order_rows: int = 600
@@ -66,3 +78,14 @@ class BoundaryConfig:
     payload_share: float = 0.05
     no_negative: float = 3.0
     touches: int = 3
+    near: float = 0.03
+    far: float = 0.3
+    below: float = 0.1
+    standing: float = 0.05
+    held: float = 0.02
+    loose: float = 30.0
+    periods: float = 0.25
+    widths: tuple[float, ...] = (0.05, 0.15, 0.5)
+    clusters: int = 20
+    moved_on: float = 0.3
+    returned: float = 0.02

@@ -15,18 +15,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.estimation.checks.torque_rows import Array, TorqueRows
 
 __all__ = ["LOOSE", "GravityFit", "GravityModel"]
 
-_RIDGE = 1e-9  # of equilibrated columns: what is not excited gets the smallest parameters that fit
-_STEPS = 30
-_ENOUGH = 1e-4  # gain in log likelihood a step, below which the fit has ended
-_ROUNDS = 12  # of reweighting by each joint's own residual at most
-_SETTLED = 3e-3  # change of the logarithm of a variance, at which reweighting ends
-# [m/s^2] standard deviation of each component before any data: three times g, so that what no data
-# tell stays finite
-LOOSE = 30.0
+_RIDGE = 1e-9  # numerics: of equilibrated columns
+_STEPS = 30  # numerics
+_ENOUGH = 1e-4  # numerics: gain in log likelihood a step, below which the fit has ended
+_ROUNDS = 12  # numerics: of reweighting at most
+_SETTLED = 3e-3  # numerics: change of a log variance, at which reweighting ends
+LOOSE = BoundaryConfig.loose  # [m/s^2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +132,7 @@ class GravityModel:
         return np.asarray(weights[:, None, None] * self.gram)
 
     def _equilibrated(self, fit: GravityFit) -> Array:
-        """The parameters (p,) of columns at unit length."""
+        """Return the parameters (p,) of columns at unit length."""
         return fit.parameters * np.where(np.isfinite(self.scale), self.scale, 0.0)
 
     def curvature(self, fit: GravityFit, groups: Array) -> tuple[Array, Array]:

@@ -26,8 +26,8 @@ from pipelines.io.robot import LinkParameters
 
 __all__ = ["NOT_TOLD", "CompensatedPayload", "payload_by_links", "payload_by_reference"]
 
-_TEN = 10  # standard parameters of a body, its mass the first
-_LOOSE = 10.0  # times the torque, that a payload makes before any data
+_TEN = 10  # numerics: standard parameters of a body, its mass the first
+_LOOSE = 10.0  # numerics: times the torque, that a payload makes before any data
 _ERRORS = np.logspace(-3.0, 0.0, 61)  # σ of described links that are compared
 _NEEDS = "it needs a reference log, or links described within 5 %"
 

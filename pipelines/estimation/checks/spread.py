@@ -18,7 +18,7 @@ from pipelines.estimation.checks.torque_rows import CLUSTERS, Array
 
 __all__ = ["effective_moments", "gravity_spread", "jackknife"]
 
-_RIDGE = 1e-9  # of equilibrated columns: what is not excited gets the smallest parameters that fit
+_RIDGE = 1e-9  # numerics: of equilibrated columns
 
 
 def effective_moments(residuals: Array, starts: npt.NDArray[np.intp]) -> Array:

@@ -24,6 +24,7 @@ import numpy.typing as npt
 from pipelines.dynamics.base_parameters import base_set
 from pipelines.dynamics.chain import regressor
 from pipelines.dynamics.kinematics import SerialChain, serial_chain
+from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.estimation.checks.joint_rows import Sampled
 from pipelines.io.robot import RobotDescription
 
@@ -44,13 +45,11 @@ Array = npt.NDArray[np.float64]
 Order = tuple[int, ...]
 
 _ELSEWHERE = np.array([3.1, -5.3, 7.7])  # [m/s^2] along no axis: shows all that any gravity shows
-_SEED = 20040509
-_PERIODS = 0.25  # of the motion's mean period: length of the filter, which then keeps 4 harmonics
-_OVERLAP = 6  # moments that are kept within the length of the filter: no aliasing
-_WIDTHS = (0.05, 0.15, 0.5)  # of a joint's RMS speed: where laws of friction bend
-CLUSTERS = 20  # of all moments together
-_APART, _AGAIN = 0.3, 0.02  # of twice the variance: a motion has moved on, and is back
-_RIDGE = 1e-6  # of equilibrated columns, for a first estimate of the load alone
+_SEED = 20040509  # numerics
+_OVERLAP = 6  # numerics: moments that are kept within the length of the filter: no aliasing
+_RIDGE = 1e-6  # numerics: of equilibrated columns, for a first estimate of the load alone
+_CONFIG = BoundaryConfig()
+CLUSTERS = _CONFIG.clusters
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +143,12 @@ def own_columns(dq: Array, ddq: Array, coulomb: Array) -> Array:
     """Return the columns (n, N, c) of rotor inertia, friction in speed, and offset."""
     size = np.sqrt(np.mean(dq**2, axis=0))
     size = np.where(size > 0.0, size, 1.0)
-    laws = [coulomb, *(np.tanh(dq / (width * size)) for width in _WIDTHS), dq, dq * np.abs(dq)]
+    laws = [
+        coulomb,
+        *(np.tanh(dq / (width * size)) for width in _CONFIG.widths),
+        dq,
+        dq * np.abs(dq),
+    ]
     return np.stack([ddq, *laws, np.ones_like(dq)], axis=-1).transpose(1, 0, 2)
 
 
@@ -191,7 +195,9 @@ class RowFilter:
             for motion in motions
         ]
         period = 2.0 * np.pi / max(float(np.max(rates)), 1e-12)
-        wanted = min(_PERIODS * period / self.spacing, 0.1 * max(b - a for a, b in self.edges))
+        wanted = min(
+            _CONFIG.periods * period / self.spacing, 0.1 * max(b - a for a, b in self.edges)
+        )
         self.step = max(1, int(wanted / _OVERLAP))
         self.steps = max(1, min(int(wanted), _OVERLAP))  # within the length of the window
         length = self.step * self.steps
@@ -235,10 +241,10 @@ def _period(q: Array) -> float | None:
         float(np.mean(np.mean((q[:, lag:] - q[:, :-lag]) ** 2, axis=1) / power))
         for lag in range(1, 2 * moments // 3)
     ]
-    left = np.flatnonzero(np.array(apart) > _APART)
+    left = np.flatnonzero(np.array(apart) > _CONFIG.moved_on)
     if not left.size:
         return None
-    back = np.flatnonzero(np.array(apart[left[0] :]) < _AGAIN)
+    back = np.flatnonzero(np.array(apart[left[0] :]) < _CONFIG.returned)
     if not back.size:
         return None
     first = left[0] + int(back[0])

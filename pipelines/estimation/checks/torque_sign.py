@@ -17,10 +17,7 @@ from pipelines.quality.segments import Usable
 
 __all__ = ["touches_of_zero"]
 
-_NEAR, _FAR = 0.03, 0.3  # of the RMS: at zero, and away from it again
-_SHORT = 8  # samples: a shorter run tells neither noise nor motion
-_BELOW = 0.1  # of the samples at zero: a magnitude has none below it
-_STANDING = 0.05  # of its RMS: a joint that is slower may stand, held by its brake
+_SHORT = 8  # numerics: samples: a shorter run tells neither noise nor motion
 
 
 def touches_of_zero(logs: Sequence[Usable], config: BoundaryConfig) -> tuple[int | None, ...]:
@@ -45,20 +42,20 @@ def _touches(parts: Sequence[tuple[Array, Array]], config: BoundaryConfig) -> in
         if tau.size < _SHORT:
             continue
         speed = np.abs(np.gradient(q))
-        moving = speed > _STANDING * np.sqrt(np.nanmean(speed**2))
+        moving = speed > config.standing * np.sqrt(np.nanmean(speed**2))
         # of white noise the second difference has six times the variance
         noise = 1.4826 * _finite_median(np.abs(np.diff(tau, 2))) / np.sqrt(6.0)
         level = config.no_negative * noise
-        if level > _FAR * size and np.nanmin(tau) < 0.0:  # such noise would hide a sign
+        if level > config.far * size and np.nanmin(tau) < 0.0:  # such noise would hide a sign
             return None
         if np.nansum(tau < -max(level, 1e-6 * size)) > max(2.0, 1e-3 * tau.size):
             return None
         # a magnitude is reflected at zero: it arrives there within one step of its own
-        step = np.minimum(np.abs(np.diff(tau, prepend=tau[:1])), _NEAR * size)
+        step = np.minimum(np.abs(np.diff(tau, prepend=tau[:1])), config.near * size)
         near, there = (tau < np.maximum(step, least) for least in (level, noise))
-        if near.any() and np.mean(tau[near] < 0.0) > _BELOW:
+        if near.any() and np.mean(tau[near] < 0.0) > config.below:
             return None
-        state = np.where(there & moving, 1, np.where(tau > _FAR * size, -1, 0))
+        state = np.where(there & moving, 1, np.where(tau > config.far * size, -1, 0))
         state = state[state != 0]
         count += int(np.sum((state[1:] == 1) & (state[:-1] == -1)))
     return count
