@@ -1,8 +1,9 @@
 """Estimate the base parameter set by least squares.
 
-Reads    logs with experiment "excitation" or "free", role "identify"; every log of role "validate" judges;
-         optionally a model with friction
-Writes   result.json, result.h5, model.json, logs/ with the model's torque and the residual, report.html
+Reads    logs with experiment "excitation" or "free", role "identify"; every log of role "validate"
+         judges; optionally a model with friction
+Writes   result.json, result.h5, model.json, logs/ with the model's torque and the residual,
+         report.html
 Source   Kostić et al. 2004, eq. (12)-(15), Table V, Figs. 9, 11, 12
 """
 
@@ -59,16 +60,20 @@ from pipelines.stage import Inputs, Request, Stage, Uses, read_logs, slug
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
 FITTED = ("excitation", "free")
-_COURSES = 3  # logs drawn
+_COURSES = 3  # numerics: logs drawn
 
 
 @dataclass(frozen=True)
 class Settings(Reconstruction):
-    """How motion is reconstructed (as `reconstruct`), what is done alike to torque and columns, and what is estimated."""
+    """How motion is reconstructed, what is done to torque and columns, and what is estimated."""
 
-    cutoff_hz: float | None = option(None, "Low-pass over torque and columns [Hz]. [from the motion]")
+    cutoff_hz: float | None = option(
+        None, "Low-pass over torque and columns [Hz]. [from the motion]"
+    )
     decimate: int | None = option(None, "Keep every Nth sample. [four a period of the low-pass]")
-    min_speed: tuple[float, ...] = option((0.0,), "Leave slower samples out [rad/s]: one, or one a joint.")
+    min_speed: tuple[float, ...] = option(
+        (0.0,), "Leave slower samples out [rad/s]: one, or one a joint."
+    )
     symmetric: bool = option(False, "RRR arm, mirror-symmetric links: p4 = p15 = 0.")
     weighted: bool = option(True, "Weigh all joints alike, as Kostić et al. 2004.", "--unweighted")
     offset: bool = True
@@ -85,14 +90,16 @@ class Settings(Reconstruction):
 
 
 def read(request: Request, settings: Settings) -> Inputs:
-    """The logs, and the model whose friction is to be taken."""
+    """Read the logs, and the model whose friction is to be taken."""
     refuse_strange(settings)
     inputs = read_logs(request, settings)
     if settings.model is None:
         return inputs
     path = Path(settings.model).absolute()
-    sources = (path,) if path.is_file() else ()  # a shipped model is not one of the user's files
-    return replace(inputs, sources=(*inputs.sources, *sources), material=Arm.from_model(read_model(settings.model), path))
+    # a shipped model is not one of the user's files
+    sources = (*inputs.sources, *((path,) if path.is_file() else ()))
+    material = Arm.from_model(read_model(settings.model), path)
+    return replace(inputs, sources=sources, material=material)
 
 
 def compute(inputs: Inputs, settings: Settings) -> Result:
@@ -100,19 +107,29 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
 
     Raises:
         NothingMatched: C06, no log to fit.
-        UsageError: C02, settings that do not fit, logs of several robots, or a model of another one.
-        InputRejected: the doctor rejects a log: its first reason; S23, S24, S25, the torque lacks gravity, has one of another
-            direction, or has no sign; S13, S14, S15, T06, torque and motion of a log do not belong
-            together; T04, no stretch of a log can be used; T08, too few
-            equations are left; D14, a log that is fitted shall judge as well.
+        InputRejected: the doctor rejects a log; S23, S24, S25, the torque lacks
+        InputRejected: the doctor rejects a log: its first reason; S23, S24, S25, the torque lacks
+            gravity, has one of another direction, or has no sign; S13, S14, S15, T06, torque and
+            motion of a log do not belong together; T04, no stretch of a log can be used; T08, too
+            few equations are left; D14, a log that is fitted shall judge as well.
     """
     refuse_strange(settings)
     identify, validate = _chosen(inputs, settings.allow_overlap)
     given = _friction_of(inputs.material, identify[0])
-    columns = nominal_columns(identify[0].robot, friction=given is None, offset=settings.offset,
-                              rotor_inertia=settings.rotor_inertia, symmetric=settings.symmetric)
-    recipe = Recipe(settings.reconstruction, settings.cutoff_hz, settings.decimate, settings.min_speed,
-                    None if given is None else given.friction_torque)
+    columns = nominal_columns(
+        identify[0].robot,
+        friction=given is None,
+        offset=settings.offset,
+        rotor_inertia=settings.rotor_inertia,
+        symmetric=settings.symmetric,
+    )
+    recipe = Recipe(
+        settings.reconstruction,
+        settings.cutoff_hz,
+        settings.decimate,
+        settings.min_speed,
+        None if given is None else given.friction_torque,
+    )
     for log in (*identify, *validate):
         settings.reconstruction.check(log.n_joints)
         refuse_unfit(settings, log)
@@ -121,35 +138,57 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     motions, said = _examined(identify, subjects, settings, said_of_torque)
     judges, said_too = _examined(validate, judging, settings, said_of_torque)
     even = for_equations((*motions, *judges))
-    recipe = with_cutoff(recipe, even[:len(motions)])
+    recipe = with_cutoff(recipe, even[: len(motions)])
     means, scatter = averaged(even, settings.reconstruction, recipe.cutoff_hz)
     means = without_stiction(means, len(motions), columns, recipe, settings.weighted)
-    fitted = fit_logs(means[:len(motions)], columns, recipe, settings.weighted)
-    judged = judge(fitted, means[len(motions):], settings.blocks)
-    arm = fitted_arm(fitted.estimate, identify[0].robot_name, () if given is None else given.friction)
+    fitted = fit_logs(means[: len(motions)], columns, recipe, settings.weighted)
+    judged = judge(fitted, means[len(motions) :], settings.blocks)
+    arm = fitted_arm(
+        fitted.estimate, identify[0].robot_name, () if given is None else given.friction
+    )
     logs = (*identify, *validate)
-    said_of_periods = [check for own, log in zip(scatter, logs, strict=True) if own is not None
-                       for check in doubts(own.floor, log.source or log.name, settings.average)]
+    said_of_periods = [
+        check
+        for own, log in zip(scatter, logs, strict=True)
+        if own is not None
+        for check in doubts(own.floor, log.source or log.name, settings.average)
+    ]
     said += negative_viscous(fitted.estimate, arm.name)
-    result = replace(_result(fitted, judged, (*motions, *judges), arm, settings), boundary=boundary,
-                     data_quality=(*said_of_torque, *said, *said_too, *said_of_periods),
-                     noise_floor=residuals(scatter, fitted, judged, logs, settings.average))
-    return result if not settings.compare else replace(
-        result, comparison=compare(fitted, judged, settings.blocks, settings.weighted),
-        rigid_body_alone=_rigid_body_alone(fitted, means, settings))
+    result = replace(
+        _result(fitted, judged, (*motions, *judges), arm, settings),
+        boundary=boundary,
+        data_quality=(*said_of_torque, *said, *said_too, *said_of_periods),
+        noise_floor=residuals(scatter, fitted, judged, logs, settings.average),
+    )
+    return (
+        result
+        if not settings.compare
+        else replace(
+            result,
+            comparison=compare(fitted, judged, settings.blocks, settings.weighted),
+            rigid_body_alone=_rigid_body_alone(fitted, means, settings),
+        )
+    )
 
 
 def _rigid_body_alone(fitted: Fitted, means: Motions, settings: Settings) -> tuple[float, ...]:
-    """Held-out error (joints,) of the rigid body fitted without friction and offset, on the same equations."""
+    """Return the held-out error (joints,) of the rigid body fitted without friction and offset."""
     identify = len(fitted.motions)
-    columns = nominal_columns(means[0][0].robot, friction=False, offset=False, rotor_inertia=settings.rotor_inertia,
-                              symmetric=settings.symmetric)
-    alone = fit_logs(means[:identify], columns, replace(fitted.recipe, known=None), settings.weighted)
+    columns = nominal_columns(
+        means[0][0].robot,
+        friction=False,
+        offset=False,
+        rotor_inertia=settings.rotor_inertia,
+        symmetric=settings.symmetric,
+    )
+    alone = fit_logs(
+        means[:identify], columns, replace(fitted.recipe, known=None), settings.weighted
+    )
     return tuple(map(float, judge(alone, means[identify:], settings.blocks).errors.rms))
 
 
 def _accepted(logs: list[ExperimentLog]) -> list[tuple[Subject, list[Check]]]:
-    """What the doctor says of every log; of what the logs do not show, D09, the estimate itself knows.
+    """Return what the doctor says of every log; of D09 the estimate itself knows.
 
     Raises:
         InputRejected: the first reason to reject one.
@@ -165,9 +204,10 @@ def _references(inputs: Inputs) -> list[ExperimentLog]:
     return [opened.log for opened in inputs.logs if opened.log.role == "reference"]
 
 
-def _boundary(logs: list[ExperimentLog], references: list[ExperimentLog],
-              settings: Settings) -> tuple[Boundary | None, tuple[Check, ...]]:
-    """What the torque of the logs is, and what of it is told, where a mismatch is allowed."""
+def _boundary(
+    logs: list[ExperimentLog], references: list[ExperimentLog], settings: Settings
+) -> tuple[Boundary | None, tuple[Check, ...]]:
+    """Return what the torque of the logs is, and its findings where a mismatch is allowed."""
     boundary = torque_boundary([recording(log) for log in (*logs, *references)])
     findings = boundary_findings(boundary, logs[0].source or logs[0].name)
     if findings and not settings.skip_sanity_checks:
@@ -179,13 +219,19 @@ def _with_way_out(gate: Check) -> Check:
     return replace(gate, remedy=f"{gate.remedy}; if it is right as it is, say --skip-sanity-checks")
 
 
-def _examined(logs: list[ExperimentLog], subjects: list[tuple[Subject, list[Check]]], settings: Settings,
-              findings: tuple[Check, ...]) -> tuple[Motions, tuple[Check, ...]]:
-    """The motion of every log, and what is said of it."""
+def _examined(
+    logs: list[ExperimentLog],
+    subjects: list[tuple[Subject, list[Check]]],
+    settings: Settings,
+    findings: tuple[Check, ...],
+) -> tuple[Motions, tuple[Check, ...]]:
+    """Return the motion of every log, and its checks."""
     motions, said = [], []
     for log, (subject, checks) in zip(logs, subjects, strict=True):
         against = without_followers(mismatches(subject), findings)
-        if not settings.skip_sanity_checks and (gate := next((check for check in against if check.gate), None)):
+        if not settings.skip_sanity_checks and (
+            gate := next((check for check in against if check.gate), None)
+        ):
             raise _with_way_out(gate).as_error()
         motions.append((log, reconstruct(log, settings.reconstruction, subject.good)))
         said += [*checks, *against]
@@ -194,36 +240,65 @@ def _examined(logs: list[ExperimentLog], subjects: list[tuple[Subject, list[Chec
 
 def _friction_of(model: Arm | None, log: ExperimentLog) -> Arm | None:
     if model is not None and model.n_joints != log.n_joints:
-        raise UsageError("C02", f"the model has {model.n_joints} joints, {log.name} has {log.n_joints}", where="--model",
-                         remedy="give a model of this robot")
+        raise UsageError(
+            "C02",
+            f"the model has {model.n_joints} joints, {log.name} has {log.n_joints}",
+            where="--model",
+            remedy="give a model of this robot",
+        )
     return model if model is not None and model.friction else None
 
 
-def _result(fitted: Fitted, judged: Judged, motions: Motions, arm: Arm, settings: Settings) -> Result:
+def _result(
+    fitted: Fitted, judged: Judged, motions: Motions, arm: Arm, settings: Settings
+) -> Result:
     found = fitted.estimate
     both = {"identify": fitted.errors, "validate": judged.errors}
     torques = [(log, motion, torque_parts(arm, log, motion)) for log, motion in motions]
     growth, checked = found.convergence(), consistency(found, arm.body)
     names = [column.name for column in found.columns.names]
     return Result(
-        robot=arm.name, joints=tuple(joint.name for joint in arm.robot.joints),
-        torque_units=tuple(joint_unit("tau", joint.revolute) for joint in arm.robot.joints), parameters=parameters(fitted, arm),
-        condition_number=found.condition_number, condition_number_fit=found.solution.condition, rank=found.solution.rank,
+        robot=arm.name,
+        joints=tuple(joint.name for joint in arm.robot.joints),
+        torque_units=tuple(joint_unit("tau", joint.revolute) for joint in arm.robot.joints),
+        parameters=parameters(fitted, arm),
+        condition_number=found.condition_number,
+        condition_number_fit=found.solution.condition,
+        rank=found.solution.rank,
         relative_error={key: e.relative_error for key, e in both.items()},
         torque_rms={key: tuple(map(float, e.rms)) for key, e in both.items()},
         torque_signal_rms={key: tuple(map(float, e.signal_rms)) for key, e in both.items()},
-        held_out=judged.by, filter_hz=fitted.recipe.cutoff_hz, equations=tuple(map(int, found.statistics.counts)),
+        held_out=judged.by,
+        filter_hz=fitted.recipe.cutoff_hz,
+        equations=tuple(map(int, found.statistics.counts)),
         friction="fitted" if fitted.recipe.known is None else "given",
-        friction_of="" if fitted.recipe.known is None else "fit-friction" if settings.model is None else Path(settings.model).name,
-        physically_consistent=None if checked is None else checked.consistent, consistency=checked, balance=power_balance(found),
+        friction_of=""
+        if fitted.recipe.known is None
+        else "fit-friction"
+        if settings.model is None
+        else Path(settings.model).name,
+        physically_consistent=None if checked is None else checked.consistent,
+        consistency=checked,
+        balance=power_balance(found),
         unresolved=found.unresolved.told(columns_in_words(names)),
         hard_to_see=hard_to_see(found.solution, names),
         not_separated=not_separated(found.solution, found.std, names),
-        comparison=(), convergence_samples=growth.samples, convergence=growth.beta, convergence_std=growth.std,
-        courses=tuple(course(log, motion, parts, fitted.cutoff_hz) for log, motion, parts in torques[:_COURSES]),
-        arm=arm, model=arm.to_model(validity=validity(motions[:len(fitted.motions)]), sources=_sources(motions),
-                           notes=(f"fitted by rrrid estimate-bps, motion by {settings.method}",)),
-        derived=tuple(_derived(log, motion, parts, settings) for log, motion, parts in torques))
+        comparison=(),
+        convergence_samples=growth.samples,
+        convergence=growth.beta,
+        convergence_std=growth.std,
+        courses=tuple(
+            course(log, motion, parts, fitted.cutoff_hz)
+            for log, motion, parts in torques[:_COURSES]
+        ),
+        arm=arm,
+        model=arm.to_model(
+            validity=validity(motions[: len(fitted.motions)]),
+            sources=_sources(motions),
+            notes=(f"fitted by rrrid estimate-bps, motion by {settings.method}",),
+        ),
+        derived=tuple(_derived(log, motion, parts, settings) for log, motion, parts in torques),
+    )
 
 
 def _chosen(inputs: Inputs, allow_overlap: bool) -> tuple[list[ExperimentLog], list[ExperimentLog]]:
@@ -231,11 +306,16 @@ def _chosen(inputs: Inputs, allow_overlap: bool) -> tuple[list[ExperimentLog], l
     identify = [log for log in logs if log.role == "identify" and log.experiment in FITTED]
     if not identify:
         kinds = ", ".join(sorted({f"{log.experiment} ({log.role})" for log in logs})) or "none"
-        raise NothingMatched("C06", f"no excitation or free log of role identify; there are: {kinds}", where=inputs.label,
-                             remedy="record an excitation, or give the folder that has one")
+        words = f"no excitation or free log of role identify; there are: {kinds}"
+        remedy = "record an excitation, or give the folder that has one"
+        raise NothingMatched("C06", words, inputs.label, remedy)
     if len({log.robot_text for log in logs}) > 1:
-        raise UsageError("C02", "logs of several robots", where=inputs.label,
-                         remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
+        raise UsageError(
+            "C02",
+            "logs of several robots",
+            where=inputs.label,
+            remedy="name the logs of one; 'rrrid run' takes a folder of several apart",
+        )
     validate = [log for log in logs if log.role == "validate"]
     if not allow_overlap:
         _refuse_leak(identify, validate)
@@ -247,40 +327,59 @@ def _refuse_leak(identify: list[ExperimentLog], validate: list[ExperimentLog]) -
     seen = {log.q.tobytes() + log.tau.tobytes(): log for log in identify}
     for log in validate:
         if (same := seen.get(log.q.tobytes() + log.tau.tobytes())) is not None:
-            raise InputRejected("D14", f"leak: {same.name} and {log.name} hold the same samples with roles identify and validate",
-                                where=log.source or log.name,
-                                remedy="judge on another recording, or say --allow-overlap")
+            words = f"leak: {same.name} and {log.name} hold the same samples "
+            words += "with roles identify and validate"
+            remedy = "judge on another recording, or say --allow-overlap"
+            raise InputRejected("D14", words, log.source or log.name, remedy)
 
 
-def _derived(log: ExperimentLog, motion: Reconstructed, parts: ArmTorque, settings: Settings) -> tuple[str, ExperimentLog]:
-    with_motion = derive(log, "reconstruct", settings.reconstruction.as_settings(), motion.signals())
+def _derived(
+    log: ExperimentLog, motion: Reconstructed, parts: ArmTorque, settings: Settings
+) -> tuple[str, ExperimentLog]:
+    with_motion = derive(
+        log, "reconstruct", settings.reconstruction.as_settings(), motion.signals()
+    )
     total = parts.total
-    settings = replace(settings, model=None if settings.model is None else Path(settings.model).name)
-    signals = {"tau_model": total, "tau_inertia": parts.inertia, "tau_coriolis": parts.coriolis, "tau_gravity": parts.gravity,
-               "tau_friction_model": parts.friction, "tau_effects": parts.effects, "tau_residual": log.tau - total}
+    settings = replace(
+        settings, model=None if settings.model is None else Path(settings.model).name
+    )
+    signals = {
+        "tau_model": total,
+        "tau_inertia": parts.inertia,
+        "tau_coriolis": parts.coriolis,
+        "tau_gravity": parts.gravity,
+        "tau_friction_model": parts.friction,
+        "tau_effects": parts.effects,
+        "tau_residual": log.tau - total,
+    }
     return slug(log.name), derive(with_motion, "estimate-bps", encode(settings)[0], signals)
 
 
 def _sources(motions: Motions) -> tuple[Source, ...]:
-    """The recordings behind the model, by the digest that is theirs in either container and in every derived log."""
-    return tuple(Source(log.name, digest_of(recording(log)), log.experiment, log.role) for log, _ in motions)
+    """Return the recordings behind the model, by the digest of either container."""
+    return tuple(
+        Source(log.name, digest_of(recording(log)), log.experiment, log.role) for log, _ in motions
+    )
 
 
 def _checks(result: Result) -> tuple[Check, ...]:
     found = list(result.data_quality)
     if result.unresolved:
-        found.append(Check.of("D09", "warn", result.unresolved, where=result.robot, gate=True, remedy=REMEDY))
+        found.append(
+            Check.of("D09", "warn", result.unresolved, where=result.robot, gate=True, remedy=REMEDY)
+        )
     if result.consistency is not None and not result.consistency.consistent:
         links = ", ".join(result.consistency.violating)
-        found.append(Check.of("D15", "warn", f"no links that could exist have these parameters ({result.consistency.distance:.1f} "
-                              f"standard deviations away); {links} would need negative mass or inertia",
-                              where=result.robot, gate=True,
-                              remedy="look for an effect that the model lacks, or for wrong units and signs"))
+        away = f"{result.consistency.distance:.1f} standard deviations away"
+        words = f"no links that could exist have these parameters ({away}); "
+        words += f"{links} would need negative mass or inertia"
+        remedy = "look for an effect that the model lacks, or for wrong units and signs"
+        found.append(Check.of("D15", "warn", words, result.robot, remedy, gate=True))
     return tuple(found)
 
 
 def write(result: Result, folder: Path, request: Request) -> None:
-    """model.json, its covariance, and every log with the model's torque and the residual."""
+    """Write model.json, its covariance, and every log with the model's torque and the residual."""
     write_model(folder / "model.json", result.model)
     if (known := result.arm.uncertainty) is not None:
         write_covariance(folder / "covariance.json", known.names, known.covariance)
@@ -289,23 +388,40 @@ def write(result: Result, folder: Path, request: Request) -> None:
 
 
 def report(result: Result) -> Report:
-    """The verdict, Table V with standard deviations, and what the estimate rests on."""
+    """Return the verdict, Table V with standard deviations, and what the estimate rests on."""
     return bps_report(result)
 
 
 def _reads(log: ExperimentLog, settings: Settings) -> bool:
-    """Logs to fit, and those that judge."""
+    """Return whether a log is fitted, or judges."""
     return log.role == "validate" or (log.role == "identify" and log.experiment in FITTED)
 
 
 def _restored(result: Result, folder: Path) -> Result:
-    """A stored result with its model, out of the files that `write` wrote."""
+    """Return a stored result with its model, from the files that `write` wrote."""
     arm = Arm.from_model(read_model(folder / "model.json"), folder)
     known = folder / "covariance.json"
-    return replace(result, arm=replace(arm, uncertainty=Uncertainty(*read_covariance(known)) if known.is_file() else None))
+    return replace(
+        result,
+        arm=replace(
+            arm, uncertainty=Uncertainty(*read_covariance(known)) if known.is_file() else None
+        ),
+    )
 
 
-STAGE = Stage("estimate-bps", "Estimate the base parameter set", Settings, compute, report, read, write,
-              lambda result, check: int(check and any(found.gate for found in _checks(result))), _checks,
-              lambda result, inputs: replace(inputs, material=result.arm), hands_on="material", restored=_restored,
-              uses=Uses(_reads, before=True), sessions="one")
+STAGE = Stage(
+    "estimate-bps",
+    "Estimate the base parameter set",
+    Settings,
+    compute,
+    report,
+    read,
+    write,
+    lambda result, check: int(check and any(found.gate for found in _checks(result))),
+    _checks,
+    lambda result, inputs: replace(inputs, material=result.arm),
+    hands_on="material",
+    restored=_restored,
+    uses=Uses(_reads, before=True),
+    sessions="one",
+)

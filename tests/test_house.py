@@ -14,7 +14,7 @@ import pytest
 REPO = Path(__file__).resolve().parents[1]
 # Areas not yet moved to the layout of the design: the list only shrinks, and so does each number.
 CONSTANTS = {
-    "pipelines/diagnose.py": 1, "pipelines/diagnosis": 9, "pipelines/estimate_bps.py": 1,
+    "pipelines/diagnose.py": 1, "pipelines/diagnosis": 9,
     "pipelines/report": 63,
 }
 
