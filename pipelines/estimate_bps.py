@@ -107,7 +107,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
 
     Raises:
         NothingMatched: C06, no log to fit.
-        InputRejected: the doctor rejects a log; S23, S24, S25, the torque lacks
+        UsageError: C02, settings that do not fit, logs of several robots, or another's model.
         InputRejected: the doctor rejects a log: its first reason; S23, S24, S25, the torque lacks
             gravity, has one of another direction, or has no sign; S13, S14, S15, T06, torque and
             motion of a log do not belong together; T04, no stretch of a log can be used; T08, too
