@@ -29,6 +29,7 @@ import pinocchio as pin
 
 from pipelines.dynamics import chain as serial
 from pipelines.dynamics.base_parameters import BaseArm
+from pipelines.dynamics.body import standard_parameters
 from pipelines.dynamics.kinematics import SerialChain
 from pipelines.io.robot import RobotDescription
 from pipelines.io.robot_files import load_robot
@@ -63,7 +64,7 @@ def rrr() -> tuple[RobotDescription, Any]:
     for i, joint in enumerate(robot.joints):
         model.addJoint(i, pin.JointModelRZ(), behind, joint.name)
         behind = pin.SE3(pin.utils.rotate("x", joint.alpha), np.array([joint.a, 0.0, joint.d]))
-        m, mx, my, mz, xx, yy, zz, xy, xz, yz = serial.standard_parameters(
+        m, mx, my, mz, xx, yy, zz, xy, xz, yz = standard_parameters(
             [joint.link] if joint.link else []
         )
         model.inertias[i + 1] = behind.act(
@@ -137,7 +138,7 @@ def compare(name: str, robot: RobotDescription, model: Any, samples: int) -> lis
         model,
         np.concatenate([inertia.toDynamicParameters() for inertia in list(model.inertias)[1:]]),
     )
-    phi = serial.standard_parameters(
+    phi = standard_parameters(
         [joint.link for joint in robot.joints if joint.link is not None]
     )
     motion = np.random.default_rng(7).uniform(-3.0, 3.0, (3, samples, n))

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 from pipelines.dynamics import chain as serial
+from pipelines.dynamics.body import standard_parameters
 from pipelines.dynamics.kinematics import serial_chain
 from pipelines.errors import UsageError
 from pipelines.io.robot import LinkParameters, RobotDescription, format_robot, parse_robot
@@ -66,7 +67,7 @@ def _difference(robot: RobotDescription, text: str) -> float:
                                   pin.neutral(full))
     assert list(model.names)[1:] == names
     kept = parse_robot(format_robot(robot))  # as it travels in a log
-    phi = serial.standard_parameters([joint.link or NOTHING for joint in kept.joints])
+    phi = standard_parameters([joint.link or NOTHING for joint in kept.joints])
     rng = np.random.default_rng(5)
     q, dq, ddq = (rng.uniform(-2.0, 2.0, (20, robot.n_joints)) for _ in range(3))
     ours = serial.inverse_dynamics(serial_chain(kept), q, dq, ddq, phi)
