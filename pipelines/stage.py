@@ -255,7 +255,8 @@ class Answer(Generic[S, R]):
     @cached_property
     def report(self) -> Report:
         """The words, tables and figures of the result."""
-        return renamed(self.stage.report(self.result), short_names(self.request.named))
+        told: Report = renamed(self.stage.report(self.result), short_names(self.request.named))
+        return told
 
     def write(self, out: Path) -> dict[str, Any]:
         """Write everything into a folder that takes the place of `out`; return the JSON object.
@@ -265,8 +266,8 @@ class Answer(Generic[S, R]):
             EnvironmentFault: the folder cannot be written.
         """
         stage, result = self.stage, self.result
-        object_, series = encode(result)
-        object_ = tilde(headed(stage.name, object_))
+        bare, series = encode(result)
+        object_: dict[str, Any] = tilde(headed(stage.name, bare))
         sources = {str(path): value for path, value in self.hashes.items()}
         about = _about(stage, self.request, self.settings) | {"inputs": sources}
         with _new_folder(out) as folder:
@@ -301,7 +302,7 @@ def answered(
     Raises:
         RrridError: what `compute` raises, or under `strict` the first repair.
     """
-    hashes = _hashes(inputs.sources, inputs.hashes) | described
+    hashes = {**_hashes(inputs.sources, inputs.hashes), **described}
     # equal inputs give equal bytes in any place: no path of this machine goes into a result
     names = short_names(request.named)
     result = renamed(stage.compute(inputs, settings), names)

@@ -192,7 +192,8 @@ def load(
         InputRejected: no log can be read.
     """
     from pipelines.inspect import STAGE, Settings
-    from pipelines.stage import Request, answered, of_one_session, read_logs
+    from pipelines.io.sessions import of_one_session
+    from pipelines.stage import Request, answered, read_logs
 
     given = [paths] if isinstance(paths, str | Path) else paths
     where = tuple(Path(one).absolute() for one in given)
