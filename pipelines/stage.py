@@ -74,6 +74,7 @@ __all__ = [
     "read_logs",
     "refuse_foreign",
     "result_type",
+    "robot_hashes",
     "run_stage",
     "slug",
     "tilde",
@@ -188,7 +189,7 @@ def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     if request.out is not None:
         refuse_place(request.out, (), request.paths)
         refuse_foreign(request.out, request.force, stage.remakes, stage.name)
-    described = {} if request.robot is None else _hashes(robot_sources(request.robot), {})
+    described = robot_hashes(request)
     inputs = stage.read(request, settings)
     if stage.sessions == "folder":
         refuse_mixed(inputs, filter(os.path.isdir, request.paths))
@@ -202,6 +203,11 @@ def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
         raise
     stage.ended(inputs, True)
     return outcome
+
+
+def robot_hashes(request: Request) -> dict[Path, str]:
+    """Return the SHA-256 of the files that describe the robot which a request names."""
+    return {} if request.robot is None else _hashes(robot_sources(request.robot), {})
 
 
 def _outcome(

@@ -19,12 +19,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from pipelines.errors import RrridError, UsageError
+from pipelines.errors import RrridError, UsageError, did_you_mean
 
 if TYPE_CHECKING:
     import pandas
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from pipelines.design_excitation import Result as Design
     from pipelines.diagnose import Result as Diagnosis
     from pipelines.diagnosis.result import Extension
+    from pipelines.errors import Check
     from pipelines.estimate_bps import Result as Estimate
     from pipelines.fit_friction import Result as Friction
     from pipelines.frf import Result as Responses
@@ -98,6 +99,11 @@ class Answer(Generic[R]):
         return tuple(opened.log for opened in self.found.inputs.logs)
 
     @property
+    def checks(self) -> tuple[Check, ...]:
+        """What was found or repaired in the inputs, each with its code and a remedy."""
+        return self.found.checks
+
+    @property
     def figures(self) -> tuple[str, ...]:
         """Names of the figures of the report, for `plot`."""
         return tuple(one.name for section in self.found.report.sections for one in section.figures)
@@ -161,10 +167,10 @@ class Answer(Generic[R]):
         return out
 
     def _repr_html_(self) -> str:
-        """Return the verdict and the key figures for a notebook."""
+        """Return the verdict, the checks and the key figures for a notebook."""
         from pipelines.report.render import in_short
 
-        return in_short(self.found.report)
+        return in_short(self.found.report, self.checks)
 
 
 def load(
@@ -173,12 +179,12 @@ def load(
     robot: str | None = None,
     session: str = "",
     joints: Sequence[int] = (),
-    roles: Mapping[str, Sequence[str]] | None = None,
+    roles: Mapping[str, str | Path | Sequence[str | Path]] | None = None,
 ) -> Answer[Examination]:
     """Read logs, and examine what they can be used for.
 
     Args:
-        paths: logs (.h5, .parquet), or folders of them.
+        paths: logs (.h5, .parquet), folders of them, or patterns.
         robot: description to use instead of the one in the logs: file, URDF or shipped name.
         session: the one to take, where a folder holds several robots or days.
         joints: the joints to take, from 1, in this order; default all.
@@ -192,15 +198,24 @@ def load(
         InputRejected: no log can be read.
     """
     from pipelines.inspect import STAGE, Settings
+    from pipelines.io.files import expanded
+    from pipelines.io.schema import ROLES
     from pipelines.io.sessions import of_one_session
-    from pipelines.stage import Request, answered, read_logs
+    from pipelines.stage import Request, answered, read_logs, robot_hashes
 
-    given = [paths] if isinstance(paths, str | Path) else paths
-    where = tuple(Path(one).absolute() for one in given)
-    request = Request(where, robot=robot, session=session, joints=tuple(joints), roles=roles or {})
-    started = time.time()
+    started, by_role = time.time(), {role: _listed(own) for role, own in (roles or {}).items()}
+    for role in set(by_role).difference(ROLES):
+        words = f"no role '{role}'{did_you_mean(role, ROLES)}"
+        raise UsageError("C02", words, "load", f"there are: {', '.join(ROLES)}")
+    where = expanded(Path(one).expanduser().absolute() for one in _listed(paths))
+    request = Request(where, robot=robot, session=session, joints=tuple(joints), roles=by_role)
+    described = robot_hashes(request)
     inputs = of_one_session(read_logs(request, Settings(), keep_rejected=True))
-    return Answer(answered(STAGE, request, Settings(), inputs, {}, started))
+    return Answer(answered(STAGE, request, Settings(), inputs, described, started))
+
+
+def _listed(paths: str | Path | Sequence[str | Path]) -> list[str]:
+    return [str(one) for one in ([paths] if isinstance(paths, str | Path) else paths)]
 
 
 def fit_friction(given: Answer[Any], **options: Any) -> Answer[Friction]:
@@ -260,7 +275,8 @@ def design(robot: str | Path | None = None, **options: Any) -> Answer[Design]:
     from pipelines.design_excitation import STAGE, Settings, read
     from pipelines.stage import Request, answered
 
-    settings = Settings(robot=None if robot is None else str(robot), **options)
+    named = {"robot": None if robot is None else str(robot)}
+    settings = _settings(Settings(), options | named, "design")
     request, started = Request(()), time.time()
     return Answer(answered(STAGE, request, settings, read(request, settings), {}, started))
 
@@ -273,7 +289,30 @@ def _next(module: str, given: Answer[Any], options: dict[str, Any]) -> Answer[An
         remedy = "name them when the logs are read: load(paths, roles={...})"
         raise UsageError("C02", f"logs of role {min(roles)}", module, remedy)
     stage: Stage[Any, Any] = import_module(f"pipelines.{module}").STAGE
-    settings = replace(stage.in_run or stage.settings(), **options)
+    settings = _settings(stage.in_run or stage.settings(), options, stage.name)
     started, before = time.time(), given.found
     inputs = handed_on(before, stage, settings, anew="model" in options)
     return Answer(answered(stage, before.request, settings, inputs, before.hashes, started))
+
+
+def _settings(usual: Any, options: dict[str, Any], where: str) -> Any:
+    """Return settings with some of them changed.
+
+    Raises:
+        UsageError: C01, there is no such option; C02, a value that it cannot have.
+    """
+    from pydantic import TypeAdapter, ValidationError
+
+    names = [one.name for one in fields(usual)]
+    for name in options:
+        if name not in names:
+            words = f"no option '{name}'{did_you_mean(name, names)}"
+            raise UsageError("C01", words, where, f"there are: {', '.join(names)}")
+    kept = {name: getattr(usual, name) for name in names}
+    try:
+        return TypeAdapter(type(usual)).validate_python(kept | options)
+    except ValidationError as problem:
+        first = problem.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        words = f"{place}: {first['msg'].lower()}"
+        raise UsageError("C02", words, where, "see the help of the command") from None

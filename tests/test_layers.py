@@ -42,7 +42,7 @@ FILES = ("pipelines.io", "pipelines.importers")
 DOORS: dict[str, str | tuple[str, ...]] = {
     "typer": "rrrid_cli", "matplotlib": ("pipelines.report", "rrrid"), "jinja2": "pipelines.report", "h5py": FILES,
     "pandas": (*FILES, "rrrid"), "pyarrow": FILES, "filterpy": "pipelines.selfcheck", "mujoco": ("bench", "pipelines.export"),
-    "pinocchio": "pipelines.export", "yaml": "nobody", "pickle": "nobody", "pydantic": FILES, "pydantic_core": FILES,
+    "pinocchio": "pipelines.export", "yaml": "nobody", "pickle": "nobody", "pydantic": (*FILES, "rrrid"), "pydantic_core": FILES,
     "tomllib": "pipelines.io.sandbox",
     "rich": "rrrid_cli", "pebble": "pipelines.executor", "dask": "pipelines.executor", "distributed": "pipelines.executor",
     "psutil": "pipelines.executor", "packaging": "pipelines.selfcheck",

@@ -17,6 +17,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from pipelines.errors import Check
 from pipelines.io.output import write_file
 from pipelines.report.report import (
     Figure,
@@ -101,10 +102,12 @@ def render_report(report: Report, footer: Mapping[str, str]) -> dict[str, bytes]
     return {"report.html": page.encode(), **files}
 
 
-def in_short(report: Report) -> str:
-    """Return the verdict and the key figures as HTML, for a notebook."""
+def in_short(report: Report, checks: Sequence[Check] = ()) -> str:
+    """Return the verdict, what was found in the inputs, and the key figures as HTML."""
     table = report.key_figures and _table_words(report.key_figures)
-    return template("notebook.html").render(verdict=_prose(report.verdict), table=table)
+    said = [_prose(f"{check.code}: {check.message}") for check in checks if check.level != "ok"]
+    verdict = _prose(report.verdict)
+    return template("notebook.html").render(verdict=verdict, said=said, table=table)
 
 
 def _pictures(figures: Mapping[str, Figure]) -> dict[str, Picture]:

@@ -97,3 +97,33 @@ def test_saved_model_is_simulated(model: rrrid.Answer, tmp_path: Path):
 def test_roles_are_given_where_logs_are_read(loaded: rrrid.Answer):
     with pytest.raises(UsageError, match="load"):
         rrrid.diagnose(loaded, reference=("before",))
+
+
+def test_options_that_are_not_there_name_the_nearest(loaded: rrrid.Answer):
+    with pytest.raises(UsageError, match="did you mean 'cutoff_hz'"):
+        rrrid.estimate(loaded, cutoff_h=3.0)
+    with pytest.raises(UsageError, match="criterion"):
+        rrrid.design("rrr", criterium="A")
+
+
+def test_value_that_an_option_cannot_have_is_refused(loaded: rrrid.Answer):
+    with pytest.raises(UsageError, match="blocks"):
+        rrrid.estimate(loaded, blocks="many")
+
+
+def test_role_that_is_not_there_is_refused():
+    with pytest.raises(UsageError, match="did you mean 'reference'"):
+        rrrid.load(LOGS, roles={"referense": LOGS})
+
+
+def test_logs_take_the_role_that_they_are_given():
+    given = rrrid.load(LOGS / "hold-1.h5", roles={"reference": LOGS / "excitation-1.h5"})
+    assert {one.name: one.role for one in given.logs}["excitation-1"] == "reference"
+
+
+def test_description_that_was_given_is_among_the_hashed_inputs(tmp_path: Path):
+    robot = LOGS.parent / "robots" / "rrr.toml"
+    given = tmp_path / "robot.toml"
+    given.write_text(robot.read_text())
+    found = rrrid.load(LOGS / "hold-1.h5", robot=str(given)).found
+    assert given in found.hashes
