@@ -38,6 +38,7 @@ _CLOSE, _WAY = 0.3, 0.6  # numerics: size of a step back, and share of the way a
 _STUCK = 3e-4  # numerics: of the way; where less of it is left at each step there is no more
 _SETTLED = 1e-9  # numerics: Newton decrement, where the search ends
 _DEPENDENT = 1e-9  # numerics: rounding of a projection
+_SINGULAR = 1e-12  # numerics: rounding of an eigenvalue of correlations
 _UNITS = ("kg", *("kg m",) * 3, *("kg m^2",) * 6)
 # J = Σ_k _PSEUDO[k] φ_k
 _PSEUDO = np.array([pseudo_inertia(row[None])[0] for row in np.eye(10)])
@@ -121,8 +122,11 @@ def consistent_links(body: RigidBody, p: Array, covariance: Array) -> Links:
     weighed = np.diag(np.where(variance > 0.0, variance, usual**2))
     if np.isfinite(covariance).all() and (variance > 0.0).all():
         weighed = covariance
-    root = np.linalg.cholesky(np.linalg.pinv(weighed, hermitian=True)).T  # rootᵀ root = C⁻¹
     whiten = 1.0 / np.sqrt(np.diag(weighed))
+    # rootᵀ root = C⁻¹, or C⁺ where C is singular
+    values, axes = np.linalg.eigh(weighed * whiten * whiten[:, None])
+    kept = values > _SINGULAR * values.max()
+    root = (axes[:, kept] / np.sqrt(values[kept])).T * whiten
     a, b = whiten[:, None] * base, whiten * p
     described = _standard(prior)
     phi, exact = _closest(a, b, prior)

@@ -56,6 +56,18 @@ def test_links_that_exist_have_the_base_parameters_of_any_arm() -> None:
     assert np.median([feasible(seed) for seed in range(20)]) < 0.5
 
 
+def test_a_singular_covariance_has_a_root() -> None:
+    """Of fewer directions than base parameters: the distance is that of the directions that it has."""
+    arm, rng = synthetic_arm(), np.random.default_rng(0)
+    wrong = arm.p * np.where(np.arange(len(arm.p)) == 0, -1.0, 1.0)
+    for rank in (len(wrong) - 1, len(wrong) // 2):
+        spread = 0.01 * rng.normal(size=(len(wrong), rank))
+        links = consistent_links(arm.body, wrong, spread @ spread.T)
+        std = np.linalg.norm(spread, axis=1)
+        off = np.linalg.pinv(spread / std[:, None]) @ ((links.base @ links.phi.ravel() - wrong) / std)
+        assert links.distance == pytest.approx(np.linalg.norm(off))
+
+
 @pytest.mark.slow
 def test_a_thousand_arms_are_feasible() -> None:
     """Arms of 3 to 7 joints, CAD wrong by 30 %."""
