@@ -2,21 +2,24 @@
 
 A row has `of` ("link", "base", "friction" or "effect"), `place`, `name`, `value`, `std`, `unit`,
 `origin`. Link parameters are about the link's frame: m, first moments, moments and products of
-inertia, products with positive sign, Ixy = +∫xy dm. The base parameters are those of the logs.
+inertia, products with positive sign, Ixy = +∫xy dm. The base parameters are those of the
+links of the same table: the model's own, but where no links that could exist have these.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
+from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Motion
 from pipelines.dynamics.chain import STANDARD, inverse_dynamics
 from pipelines.dynamics.kinematics import Placement, SerialChain
+from pipelines.effects import find_effect
 from pipelines.export.target import Held, Loaded, Target
 from pipelines.io.results import encode, json_text
 
@@ -53,7 +56,7 @@ def _write(held: Held) -> tuple[dict[str, str], tuple[str, ...]]:
 
 
 def _load(texts: Mapping[str, str], held: Held, motion: Motion) -> Loaded:
-    """Return the torque of frames and links as a reader of the table has them, and the causes'."""
+    """Return the torque of frames, links and causes as a reader of the table has them."""
     from scipy.spatial.transform import Rotation
 
     (text,) = texts.values()
@@ -68,9 +71,28 @@ def _load(texts: Mapping[str, str], held: Held, motion: Motion) -> Loaded:
     frames = np.zeros(len(before)), tuple(before), tuple(after), np.zeros(3)
     chain = SerialChain(turning, *frames, np.array(table["gravity"]))
     torque = inverse_dynamics(chain, motion.q, motion.dq, motion.ddq, np.array(phi))
-    rigid = replace(held.arm, friction=(), effects=(), extends=None)
-    causes = held.arm.torque(motion) - rigid.torque(motion)
-    return Loaded("a reader of the table", torque + causes)
+    told = {row["name"]: row["value"] for row in table["table"] if row["of"] == "base"}
+    base = tuple(replace(known, value=told[known.name]) for known in held.arm.base)
+    rigid = replace(held.arm, base=base, friction=(), effects=(), extends=None)
+    friction, effects = (_causes(table["table"], kind) for kind in ("friction", "effect"))
+    causes = replace(rigid, friction=friction, effects=effects).torque(motion)
+    return Loaded("a reader of the table", torque + causes - rigid.torque(motion))
+
+
+def _causes(rows: Sequence[Mapping[str, Any]], kind: str) -> tuple[Acting, ...]:
+    """Return the causes of a kind; a name that comes again begins another one at that place."""
+    found = list[tuple[str, dict[str, float]]]()
+    for row in rows:
+        if row["of"] != kind:
+            continue
+        if not found or found[-1][0] != row["place"] or row["name"] in found[-1][1]:
+            found.append((row["place"], {}))
+        found[-1][1][row["name"]] = row["value"]
+    causes = list[Acting]()
+    for place, values in found:
+        name, _, joint = place.partition(":")
+        causes.append(Acting.of(find_effect(name)(joint=int(joint) if joint else None), values))
+    return tuple(causes)
 
 
 TABLE = Target(lambda acting: acting, _write, _load, "")
