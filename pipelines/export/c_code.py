@@ -136,18 +136,20 @@ class _Program:
         )
         self.memory: list[Any] = []  # next value of each
         arm = held.arm
+        loads = []  # each with the motion that it sees, from the outermost
         for acting in reversed(arm.effects):
             if acting.effect.name in _ENCODERS:
                 self._read(acting)
+            else:
+                loads.append((acting, self.q.copy(), self.v.copy(), self.a.copy()))
         self.rigid = self._rigid()
         self.tau = np.array([0.0] * len(self.q), dtype=object)
         self.friction: _Vector = None  # of all laws, known when effects come
         for law in arm.friction:  # they see the rigid body, not each other
             self._load(law)
         self.friction, self.tau = self.tau.copy(), self.rigid + self.tau
-        for acting in arm.effects:
-            if acting.effect.name not in _ENCODERS:
-                self._load(acting)
+        for acting, self.q, self.v, self.a in reversed(loads):
+            self._load(acting)
 
     def _read(self, acting: Acting) -> None:
         """Correct position, speed and acceleration by what an encoder misreads."""
@@ -281,11 +283,12 @@ def _write(held: Held) -> tuple[dict[str, str], tuple[str, ...]]:
     signature = f"void {name}_torque({name}_state *state, double t, {vectors}, double tau[{n}])"
     ends = [f"    tau[{i}] = {_text(x)};" for i, x in enumerate(o.tau)]
     ends += [f"    state->memory[{k}] = {_text(x)};" for k, x in enumerate(o.memory)]
-    ends += ["    state->t = t;"] if states else ["    (void)state;"]
+    ends += ["    state->t = t;", "    state->started = 1;"] if states else ["    (void)state;"]
     body = o.lines.needed("\n".join(ends))
     body += [f"    (void){key};" for key in ("t", "q", "dq", "ddq")]  # where a joint needs none
     if states:
-        body.insert(0, "    const double dt = t > state->t ? t - state->t : 0.0;")
+        step = "state->started && t > state->t ? t - state->t : 0.0"
+        body.insert(0, f"    const double dt = {step};")
     lost = [f"not in it: {cause.place}" for cause in held.causes if cause.carried == "lost"]
     about = [
         f"Inverse dynamics of {name} in SI units, with the zeros and signs of its logs.",
@@ -295,7 +298,7 @@ def _write(held: Held) -> tuple[dict[str, str], tuple[str, ...]]:
     ]
     guard = f"{name.upper()}_H"
     header = ["/*", *(f" * {line}" for line in about), " */", f"#ifndef {guard}"]
-    header += [f"#define {guard}", "", "typedef struct {", "    double t;"]
+    header += [f"#define {guard}", "", "typedef struct {", "    int started;", "    double t;"]
     header += [f"    double memory[{max(states, 1)}];", f"}} {name}_state;", "", f"{signature};"]
     source = [f'#include "{name}.h"', "#include <math.h>", "", signature, "{", *body, *ends, "}"]
     texts = {f"{name}.h": [*header, "", "#endif", ""], f"{name}.c": [*source, ""]}

@@ -58,9 +58,9 @@ def _carry(acting: Acting, polynomials: bool) -> Acting | None:
         return acting if name in _HELD or (name == "quadratic_drag" and polynomials) else None
     straight = ("stiffness", "rest_angle")
     held = {key: values[key] for key in (*straight, "curvature", "hardening")}
-    if not any(x for key, x in values.items() if key not in (*straight, "seen_from", "seen_to")):
-        return acting
-    return Acting.of(acting.effect, {"fourth": 0.0, "fifth": 0.0, **held})
+    bent = any(x for key, x in values.items() if key not in (*straight, "seen_from", "seen_to"))
+    cubic = Acting.of(acting.effect, {"fourth": 0.0, "fifth": 0.0, **held})
+    return cubic if bent and cubic.values != values else acting
 
 
 def _write(held: Held) -> tuple[dict[str, str], tuple[str, ...]]:

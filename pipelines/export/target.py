@@ -265,7 +265,12 @@ def _fitted(motion: Motion, torque: Array, count: int) -> Array:
 
 
 def _terms(arm: Arm) -> list[JointTerms]:
-    """Return the terms of exactly carried causes; those of the body and of C or JSON have none."""
+    """Return the terms of exactly carried causes; those of the body and of C or JSON have none.
+
+    A cause outside of a torque gain g adds its load to the log: inside it is g times as large,
+
+        τ / g + x = (τ + g x) / g
+    """
     terms = [JointTerms()] * arm.n_joints
     for acting in (*arm.friction, *arm.effects):
         x, k = acting.values, (acting.effect.joint or 1) - 1
@@ -273,18 +278,19 @@ def _terms(arm: Arm) -> list[JointTerms]:
         a, b, c = old.damping
         match acting.effect.name:
             case "viscous":
-                terms[k] = replace(old, damping=(a + x["coefficient"], b, c))
+                terms[k] = replace(old, damping=(a + old.gain * x["coefficient"], b, c))
             case "quadratic_drag":
-                terms[k] = replace(old, damping=(a, b + x["coefficient"], c))
+                terms[k] = replace(old, damping=(a, b + old.gain * x["coefficient"], c))
             case "rotor_inertia":
-                terms[k] = replace(old, rotor=old.rotor + x["inertia"])
+                terms[k] = replace(old, rotor=old.rotor + old.gain * x["inertia"])
             case "spring":
-                powers = x["stiffness"], x["curvature"], x["hardening"]
-                terms[k] = replace(old, stiffness=powers, rest=x["rest_angle"])
+                powers = (old.gain * x[key] for key in ("stiffness", "curvature", "hardening"))
+                terms[k] = replace(old, stiffness=tuple(powers), rest=x["rest_angle"])
             case "torque_offset":
-                terms[k] = replace(old, offset=old.offset + x["offset"])
+                terms[k] = replace(old, offset=old.offset + old.gain * x["offset"])
             case "torque_gain":
-                terms[k] = replace(old, gain=old.gain * (1.0 + x["gain_error"]))
+                gain = 1.0 + x["gain_error"]
+                terms[k] = replace(old, gain=old.gain * gain, limit=old.limit / gain)
             case "torque_saturation":
                 terms[k] = replace(old, limit=min(old.limit, x["limit"]))
             case "drive_lag":
