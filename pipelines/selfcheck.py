@@ -81,13 +81,15 @@ def _libraries() -> Iterator[Finding]:
         found = "rrrid was not installed: nothing says what it needs"
         yield Finding("libraries", "warn", found, "pip install -e .")
         return
+    told = set[str]()
     for wanted in map(Requirement, lines):
         extras = [
             extra
-            for extra in ("", "bench", "cluster")
+            for extra in ("", "bench", "cluster", "export")
             if wanted.marker is None or wanted.marker.evaluate({"extra": extra})
         ]
-        if extras:
+        if extras and wanted.name not in told:
+            told.add(wanted.name)
             yield _library(wanted, extras[0])
 
 

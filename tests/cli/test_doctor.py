@@ -42,6 +42,16 @@ def test_a_library_that_is_missing_or_too_old(monkeypatch: pytest.MonkeyPatch) -
     assert "rrrid[bench]" in named(found, "mujoco").remedy
 
 
+def test_the_libraries_of_the_export_are_listed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pinocchio belongs to it alone, MuJoCo to the bench too."""
+    lines = ["mujoco>=3.3.1; extra == 'bench'", "mujoco>=3.3.1; extra == 'export'", "pin>=99.0; extra == 'export'"]
+    monkeypatch.setattr(importlib.metadata, "requires", lambda name: lines)
+    found = list(selfcheck.examine(with_self_test=False))
+    assert [one.name for one in found].count("mujoco") == 1
+    assert named(found, "pin").level == "warn"
+    assert "rrrid[export]" in named(found, "pin").remedy
+
+
 def test_folders_and_threads(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """A temporary folder that cannot be written is a fault, HOME is only remarked upon; many threads are slow."""
     monkeypatch.setattr(selfcheck.tempfile, "gettempdir", lambda: "/proc/nothing")
