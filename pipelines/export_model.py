@@ -48,6 +48,7 @@ __all__ = ["STAGE", "Card", "Settings", "compute", "read", "report"]
 
 TARGETS: dict[str, Callable[[], Target]]
 TARGETS = {"urdf": lambda: URDF, "mjcf": mjcf, "c": lambda: C, "json": lambda: TABLE}
+_BODIES = ("urdf", "mjcf")  # whose readers need every number of a link
 
 
 @dataclass(frozen=True)
@@ -115,6 +116,7 @@ def compute(inputs: Inputs, settings: Settings) -> Card:
     """Make the text of the target, load it again, and compare.
 
     Raises:
+        InputRejected: D15, neither logs nor description tell links that could move.
         RuntimeError: the text has another torque than was meant: nothing is written.
     """
     known: _Material = inputs.material
@@ -125,6 +127,9 @@ def compute(inputs: Inputs, settings: Settings) -> Card:
     if flat.body is not arm.body:  # a tilted base or a longer link has other base parameters
         covariance = carried(covariance, carry_over(arm.body, flat.body))
     links = consistent_links(flat.body, flat.p, covariance)
+    states, (_, assumed, impossible) = random_states(arm.robot, validity), prior_links(arm.robot)
+    if settings.to in _BODIES and assumed and not links.exact:
+        Plant.of(arm).refuse_unphysical(states.q)  # the assumed links alone would make it move
     held_flat = flat
     if target.consistent:
         values = links.base @ links.phi.ravel()
@@ -138,7 +143,6 @@ def compute(inputs: Inputs, settings: Settings) -> Card:
     torque = target.seen(arm).torque(motion)
     there = target.load(texts, held, motion)
     replays = tuple(_replayed(log, moved, arm, (target, held)) for log, moved in logged)
-    _, assumed, impossible = prior_links(arm.robot)
     nearest = None if links.exact else rms(flat.torque(motion) - held_flat.torque(motion))
     said = Consistency(links.exact, links.distance, links.conflicts, impossible, assumed, nearest)
     return Card(
@@ -151,7 +155,7 @@ def compute(inputs: Inputs, settings: Settings) -> Card:
         (*_causes(held, target, motion, there), *_in_links(arm, flat)),
         said,
         _values(links, held),
-        _proof(target, held, random_states(arm.robot, validity)),
+        _proof(target, held, states),
         f"the log {logged[0][0].name}" if logged else "a simulated motion",
         rms(torque),
         None if there is None else rms(there.torque - torque),
@@ -237,14 +241,19 @@ def _values(links: Links, held: Held) -> tuple[LinkValue, ...]:
 
 
 def _checks(result: Card) -> tuple[Check, ...]:
-    """Return what is lost or approximated, impossible links, and a proof that is missing."""
+    """Return what is lost or approximated, assumed or impossible links, and a missing proof."""
     found, said = [], result.consistency
     for cause in result.causes:
         if cause.carried != "exactly":
-            cost = "not measured" if cause.cost is None else f"{np.max(cause.cost):.3g} N m rms"
-            words = f"{cause.place} is {cause.carried} in {result.target}; torque error {cost}"
+            words = f"{cause.place} is {cause.carried} in {result.target}; {_cost(cause, result)}"
             remedy = "export to c or json, which hold more causes"
+            remedy = "export to json, which holds every cause" if result.target == "c" else remedy
             found.append(Check.of("S18", "warn", words, result.model, remedy))
+    if said.assumed and result.target in _BODIES:
+        words = f"nothing describes the links of {', '.join(said.assumed)}: those parts of their"
+        words = f"{words} mass, centre and inertia that torque does not show are assumed"
+        remedy = "give each a [joint.link] with mass, com and inertia, from CAD or weighed"
+        found.append(Check.of("S18", "warn", words, result.robot, remedy))
     if said.impossible:
         words = f"no body could have the described link of {', '.join(said.impossible)}"
         found.append(Check.of("S17", "warn", words, result.robot, "correct the description"))
@@ -259,6 +268,16 @@ def _checks(result: Card) -> tuple[Check, ...]:
         remedy = f"install {TARGETS[result.target]().needs} and export again"
         found.append(Check.of("C02", "warn", words, result.target, remedy))
     return tuple(found)
+
+
+def _cost(cause: Cause, result: Card) -> str:
+    """Return the torque error of a cause in words, at the joint where it is largest."""
+    if cause.cost is None:
+        return "torque error not measured"
+    worst = int(np.argmax(cause.cost))
+    if cause.cost[worst] <= EXPORT.agreement * result.torque_rms.max():
+        return "inverse dynamics of this motion does not show it"
+    return f"torque error {cause.cost[worst]:.3g} {result.units[worst]} rms"
 
 
 def write(result: Card, folder: Path, request: Request) -> None:

@@ -122,7 +122,9 @@ def _causes(result: Card) -> Table:
         cost = None if cause.cost is None else float(np.max(cause.cost))
         share = None if cause.share is None else 100.0 * cause.share
         rows.append((cause.place, cause.carried, cause.how, cost, share))
-    columns = "cause", "carried", "how", "torque error rms [N m]", "of the largest torque [%]"
+    unit = " or ".join(dict.fromkeys(result.units))
+    error = f"torque error rms [{unit}]"
+    columns = "cause", "carried", "how", error, "of the largest torque [%]"
     return Table(columns, tuple(rows), keeps_empty=True)
 
 

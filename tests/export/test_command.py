@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 from pipelines import estimate_bps
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import InputRejected, RrridError, UsageError
+from pipelines.export.target import Cause
 from pipelines.export_model import STAGE, Card, Settings
 from pipelines.io.files import write_log
 from pipelines.io.model_file import read_covariance, write_covariance, write_model
@@ -147,6 +149,47 @@ def test_a_model_without_inertia_says_what_to_measure(tmp_path: Path) -> None:
         export(tmp_path, Settings(str(tmp_path / "model.json")))
     assert "excitation" in problem.value.remedy
     assert not (tmp_path / "out").exists()
+
+
+def undescribed(folder: Path, **values: float) -> Path:
+    """The model.json of the synthetic arm whose shoulder nobody describes, with these base parameters."""
+    arm = synthetic_arm()
+    joints = tuple(replace(joint, link=None) if k == 1 else joint for k, joint in enumerate(arm.robot.joints))
+    base = tuple(replace(p, value=values.get(p.name, p.value)) for p in arm.base)
+    body = rigid_body(replace(arm.robot, joints=joints))
+    write_model(folder / "model.json", replace(arm, body=body, base=base).to_model())
+    return folder / "model.json"
+
+
+def test_links_that_nobody_describes_are_told(tmp_path: Path) -> None:
+    """Where the target needs them: a warning with a remedy, and a sentence of the verdict."""
+    for to, told in (("urdf", True), ("mjcf", True), ("c", False)):
+        outcome = export(tmp_path, Settings(str(undescribed(tmp_path)), to))
+        found = [check for check in outcome.checks if "describes the links of" in check.message]
+        assert ("Nothing describes the links of" in outcome.report.verdict) == bool(found) == told
+        assert all(check.remedy and check.level == "warn" for check in found)
+
+
+def test_assumed_links_that_alone_could_move_are_refused(tmp_path: Path) -> None:
+    """The inertia of the logs is negative, and nobody describes the link: what to measure is said."""
+    model = undescribed(tmp_path, p7=-1.0, p14=-2.0)
+    for to in ("urdf", "mjcf"):
+        with pytest.raises(InputRejected, match="not positive definite") as problem:
+            export(tmp_path, Settings(str(model), to))
+        assert "richer motion" in problem.value.remedy
+        assert not (tmp_path / "out").exists()
+
+
+def test_a_lost_cause_says_its_unit_and_where_else_it_goes(tmp_path: Path) -> None:
+    """Backlash does not show in inverse dynamics; a C function is not told to become one; a slide has N."""
+    model = stored(tmp_path, ("backlash", 2, {"gap": 0.004}))
+    outcome = export(tmp_path, Settings(str(model), "c"))
+    (check,) = [check for check in outcome.checks if check.message.startswith("backlash:2")]
+    assert check.message.endswith("inverse dynamics of this motion does not show it")
+    assert check.remedy == "export to json, which holds every cause"
+    cause = Cause("coulomb:1", "lost", cost=np.array([2.0, 0.0, 0.0]))
+    slides = replace(outcome.result, causes=(cause,), units=("N", "N m", "N m"))
+    assert STAGE.checks(slides)[0].message == "coulomb:1 is lost in c; torque error 2 N rms"
 
 
 def test_another_torque_than_was_meant_is_not_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
