@@ -111,7 +111,8 @@ class Workers:
 
     submit: Callable[[Item], Future[Record]]
     ahead: int  # items to keep in hand
-    alive: Callable[[], bool] = lambda: True
+    alive: Callable[[], bool]
+    gone: Exception  # where they are not
 
 
 def load_stage(module: str) -> Stage[Any, Any]:
@@ -186,15 +187,15 @@ def failed(plan: Plan, item: Item, problem: BaseException) -> Record:
 
 
 def run_items(
-    plan: Plan, waiting: deque[Item], stopped: Callable[[], bool], seconds: float = 0.1
+    plan: Plan, waiting: deque[Item], stopped: Callable[[], bool], restarts: int = 3
 ) -> Generator[tuple[Item, Record], None, None]:
     """Yield each item of `waiting` with its record as it is done, until `stopped()`.
 
-    Items that the caller appends meanwhile are run as well. Some are kept in hand: the next one is
-    there when a worker is done with its last.
+    Items that the caller appends meanwhile are run as well. A worker that dies without an item
+    breaks pebble's pool: another takes its place, and what was in hand is queued again.
 
     Args:
-        seconds: [s] between two looks whether to stop.
+        restarts: pools that may break one after another without an item done.
 
     Raises:
         UsageError: C02, no such backend.
@@ -202,33 +203,55 @@ def run_items(
     """
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")  # of the workers: there are as many as processors
-    if not waiting:
-        return
     pool = _local if plan.backend == "local" else _cluster
-    most = sum(len(item.logs) for item in waiting)  # as many as there are sessions, at most
-    running: dict[Future[Record], Item] = {}
-    with pool(plan, max(1, min(plan.jobs, most))) as workers:
-        while (waiting or running) and not stopped():
-            while waiting and len(running) < workers.ahead:
-                future = workers.submit(waiting[0])
-                running[future] = waiting.popleft()
-            if not workers.alive():
-                raise _gone()
-            for future in wait(running, timeout=seconds, return_when=FIRST_COMPLETED).done:
-                if future.cancelled():
-                    raise _gone()
-                problem = future.exception()
-                if stopped():  # the signal went to the workers as well: no item ended them
-                    return
-                if isinstance(problem, BrokenProcessPool):
-                    raise _fault(problem, plan)
-                record = failed(plan, running[future], _fault(problem, plan)) if problem else None
-                yield running.pop(future), record or future.result()
+    broken = 0
+    while waiting and not stopped():
+        running: dict[Future[Record], Item] = {}
+        most = sum(len(item.logs) for item in waiting)  # as many as there are sessions, at most
+        try:
+            with pool(plan, max(1, min(plan.jobs, most))) as workers:
+                for item, problem, record in _results(workers, waiting, running, stopped):
+                    broken = 0
+                    yield item, record or failed(plan, item, _fault(problem, plan))
+        except BrokenProcessPool:
+            waiting.extendleft(reversed(running.values()))
+            broken += 1
+            if broken == restarts:
+                words = "worker processes end before they begin"
+                remedy = "raise --memory, and --resume"
+                raise EnvironmentFault("P04", words, "batch", remedy) from None
 
 
-def _gone() -> EnvironmentFault:
-    remedy = "start it again, and go on with --resume"
-    return EnvironmentFault("P04", "the scheduler went away", "--backend", remedy)
+def _results(
+    workers: Workers,
+    waiting: deque[Item],
+    running: dict[Future[Record], Item],
+    stopped: Callable[[], bool],
+    seconds: float = 0.1,
+) -> Iterator[tuple[Item, BaseException | None, Record | None]]:
+    """Keep some items in hand: the next one is there when a worker is done with its last.
+
+    Args:
+        seconds: [s] between two looks whether to stop.
+
+    Raises:
+        BrokenProcessPool: what is `running` was not done.
+    """
+    while (waiting or running) and not stopped():
+        while waiting and len(running) < workers.ahead:
+            future = workers.submit(waiting[0])
+            running[future] = waiting.popleft()
+        if not workers.alive():
+            raise workers.gone
+        for future in wait(running, timeout=seconds, return_when=FIRST_COMPLETED).done:
+            if future.cancelled():
+                raise workers.gone
+            problem = future.exception()
+            if stopped():  # the signal went to the workers as well: no item ended them
+                return
+            if isinstance(problem, BrokenProcessPool):
+                raise problem
+            yield running.pop(future), problem, None if problem else future.result()
 
 
 def _fault(problem: Any, plan: Plan) -> Any:
@@ -241,9 +264,6 @@ def _fault(problem: Any, plan: Plan) -> Any:
         return _crashed(problem.exitcode)
     if kind == "KilledWorker":
         return EnvironmentFault("P04", "crashed: every worker that had it died", remedy=_ALONE)
-    if isinstance(problem, BrokenProcessPool):
-        words, remedy = "worker processes end before they begin", "raise --memory, and --resume"
-        return EnvironmentFault("P04", words, "batch", remedy)
     return problem
 
 
@@ -289,12 +309,12 @@ def _local(plan: Plan, jobs: int) -> Iterator[Workers]:
             remedy = "make room in /dev/shm and let it be writable, or run the stage without batch"
             raise EnvironmentFault("P04", words, "batch", remedy) from None
         except RuntimeError as problem:
-            raise _fault(BrokenProcessPool(problem), plan) from None
+            raise BrokenProcessPool(problem) from None
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     try:
-        yield Workers(submit, 2 * jobs)
+        yield Workers(submit, 2 * jobs, lambda: bool(pool.active), BrokenProcessPool())
     finally:
         pool.stop()
         pool.join()
@@ -343,11 +363,13 @@ def _cluster(plan: Plan, jobs: int, seconds: float = 10.0) -> Iterator[Workers]:
         words, remedy = f"the scheduler cannot be reached: {problem}", "start it: dask scheduler"
         raise EnvironmentFault("P04", words, where=plan.backend, remedy=remedy) from None
     executor = client.get_executor(pure=False)
+    words, remedy = "the scheduler went away", "start it again, and go on with --resume"
     try:
         yield Workers(
             lambda item: executor.submit(in_child, plan, item),
             ahead=sys.maxsize,
             alive=lambda: bool(client.status == "running"),
+            gone=EnvironmentFault("P04", words, "--backend", remedy),
         )
     finally:
         if client.status == "running":

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import re
+from collections import deque
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
+from pipelines.batch import find_items
 from pipelines.errors import EnvironmentFault, NothingMatched
+from pipelines.executor import Plan, run_items
 from pipelines.io.output import slug
 from pipelines.stage import Request
-from tests.batch.conftest import Lay, contents, obey, statuses
+from tests.batch.conftest import QUIET, Lay, contents, obey, statuses
+from tests.batch.faulty import Settings, leave
 
 GOOD = {f"good-{i}": f"value {i} std 0.1" for i in range(6)}
 
@@ -49,6 +54,31 @@ def test_a_process_that_leaves_without_a_word_costs_its_item(lay: Lay, jobs: int
     assert statuses(outcome) == dict.fromkeys(GOOD, "ok") | {"gone": "failed RRID-P04", "gone-too": "failed RRID-P04"}
     said = {item["error"]["message"] for item in outcome.json["items"] if item["error"]}
     assert said == {"crashed: its process ended with 0"}
+
+
+@pytest.mark.row("P04")
+def test_a_worker_that_dies_without_an_item_costs_none(lay: Lay, tmp_path: Path) -> None:
+    """P04: killed between two items; another takes its place."""
+    root = lay(GOOD)
+    first, *others = find_items(root)[0]
+    waiting = deque([first])
+    done = run_items(Plan("tests.batch.faulty", Settings(), QUIET, root, tmp_path / "out"), waiting, lambda: False)
+    records = [next(done)[1]]
+    (worker,) = multiprocessing.active_children()
+    worker.kill()
+    worker.join()
+    waiting.extend(others)
+    records += [record for _, record in done]
+    assert [record.item.name for record in records] == list(GOOD)
+    assert {record.item.status for record in records} == {"ok"}
+
+
+@pytest.mark.row("P04")
+def test_workers_that_never_begin_are_exit_6(lay: Lay, monkeypatch: pytest.MonkeyPatch) -> None:
+    """P04: not tried for ever."""
+    monkeypatch.setattr("pipelines.executor._begin", leave)
+    with pytest.raises(EnvironmentFault, match=r"P04.*end before they begin.*--resume"):
+        obey(lay(GOOD))
 
 
 @pytest.mark.row("P11")
