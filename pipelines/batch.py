@@ -117,7 +117,7 @@ def run_batch(plan: Plan, tell: Callable[[str], None] = lambda words: None) -> O
     """
     wanted, plan = plan.out, replace(plan, root=plan.root.absolute(), out=plan.out.absolute())
     items, checks = find_items(plan.root, plan.each_log)
-    refuse_place(plan.out, (), (plan.root,))
+    refuse_place(plan.out, (), (plan.root,), inside=True)
     claim(plan.out, plan.stage, plan.request.force)
     number, of = plan.shard
     with locked(plan.out / "ledger", plan.out), _signals() as heard:

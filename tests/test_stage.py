@@ -152,7 +152,8 @@ def test_an_error_names_the_path_as_it_was_given(logs: Path, monkeypatch: pytest
     assert caught.value.where == "logs/b.h5"
 
 
-@pytest.mark.parametrize(("out", "allowed", "code"), [("out/new", False, "RRID-F13"), ("logs/a.h5/new", True, "RRID-C05")])
+@pytest.mark.parametrize(("out", "allowed", "code"), [
+    ("out/new", False, "RRID-F13"), ("logs/a.h5/new", True, "RRID-C05"), ("/", True, "RRID-C05 /: is the root")])
 def test_a_folder_that_cannot_be_made_is_refused_before_the_work(
         logs: Path, out: str, allowed: bool, code: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nobody waits for a result that then has no place."""

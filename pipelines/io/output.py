@@ -204,8 +204,13 @@ def _sync(path: Path) -> None:
         os.close(handle)
 
 
-def refuse_place(out: Path, sources: Iterable[Path], folders: Iterable[Path]) -> None:
+def refuse_place(
+    out: Path, sources: Iterable[Path], folders: Iterable[Path], inside: bool = False
+) -> None:
     """Refuse an `out` that holds one of the `sources`, lies in an input folder or cannot be made.
+
+    Args:
+        inside: the command writes into an `out` that is there; else it replaces it with another.
 
     Raises:
         UsageError: C05. EnvironmentFault: F13, no permission.
@@ -219,7 +224,10 @@ def refuse_place(out: Path, sources: Iterable[Path], folders: Iterable[Path]) ->
     for folder in folders:
         if os.path.isdir(folder) and target.is_relative_to(folder.resolve()):
             raise _refused(out, f"lies inside the input {folder}")
-    above = next(path for path in out.absolute().parents if path.exists())
+    places = out.absolute().parents
+    if not places:
+        raise _refused(out, "is the root of the file system")
+    above = out if inside and out.is_dir() else next(path for path in places if path.exists())
     if not above.is_dir():
         raise _refused(out, f"lies below {above}, which is not a folder")
     if not os.access(above, os.W_OK | os.X_OK):

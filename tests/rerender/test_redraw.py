@@ -60,6 +60,12 @@ def test_no_result_is_lost_to_a_report(results: Path, tmp_path: Path) -> None:
     assert contents(tmp_path / "new")["report.html"] == contents(results / "inspect")["report.html"]
 
 
+def test_the_root_is_no_place_for_a_report(results: Path) -> None:
+    """C05: it is refused as any folder that holds the result."""
+    with pytest.raises(UsageError, match="C05"):
+        rerender(results / "inspect", Path("/"))
+
+
 @pytest.mark.slow
 def test_what_was_taken_away_since_is_not_missed(results: Path, tmp_path: Path) -> None:
     """Derived logs deleted to save room: the report needs none of them."""
