@@ -193,6 +193,7 @@ def test_every_document_type_is_refused(tmp_path: Path, text: str | bytes) -> No
     _robot(_joint("j", "a", "b", inside='<origin xyz="${length} 0 0"/>'), links="ab"),
     _robot(_joint("j", "a", "b", inside='<origin xyz="$(arg x) 0 0"/>'), links="ab"),
     _robot(_joint("j", "a", "b", inside='<limit lower="${-pi}" upper="1"/>'), links="ab"),
+    _robot(_joint("${prefix}j", "a", "b"), links="ab"),
 ])
 def test_xacro_is_refused_with_the_way_out(tmp_path: Path, text: str) -> None:
     """A macro file is never run; the message says how to expand it."""
@@ -208,6 +209,13 @@ def test_a_xacro_file_is_refused_by_its_name(tmp_path: Path) -> None:
     for load in (import_urdf, load_robot):
         with pytest.raises(UsageError, match="X13"):
             load(path)
+
+
+def test_a_macro_where_nobody_reads_is_passed_over(tmp_path: Path) -> None:
+    """A mesh that ROS finds: no mesh is opened."""
+    mesh = '<link name="mesh"><visual><geometry><mesh filename="$(find arm)/m.stl"/></geometry></visual></link>'
+    text = TWO.replace("</robot>", f'{mesh}{_joint("held", "c", "mesh", "fixed")}</robot>')
+    assert _import(tmp_path, text).n_joints == 2
 
 
 def test_expanded_xacro_is_welcome(tmp_path: Path) -> None:
