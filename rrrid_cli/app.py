@@ -92,13 +92,13 @@ class Batch:
     joints: tuple[int, ...] = option((), "Joints to take of every log: 1,3. --robot is theirs.")
 
     def __post_init__(self) -> None:
-        for flag, value, possible in (
-            ("--jobs", self.jobs, self.jobs is None or self.jobs > 0),
-            ("--timeout", self.timeout, self.timeout is None or self.timeout > 0.0),
-            ("--on-error", self.on_error, self.on_error in ("continue", "abort")),
+        ways, jobs, timeout = ("continue", "abort"), self.jobs, self.timeout
+        for flag, value, possible, remedy in (
+            ("--jobs", jobs, jobs is None or jobs > 0, "give 1 or more"),
+            ("--timeout", timeout, timeout is None or timeout > 0.0, "give seconds"),
+            ("--on-error", self.on_error, self.on_error in ways, " or ".join(ways)),
         ):
             if not possible:
-                remedy = "see 'rrrid batch --help'"
                 raise UsageError("C02", f"'{value}' is not possible", flag, remedy)
 
 
