@@ -393,11 +393,12 @@ class _Search:
     def _look_at(self, entry: Path) -> None:
         is_log = entry.suffix.lower() in ENDINGS
         if entry.is_symlink() and (entry.is_dir() or (is_log and not entry.exists())):
-            words, remedy = "link that leads nowhere, or in a circle,", "remove it"
+            words = "link that leads nowhere, or in a circle, passed over"
+            remedy = "remove it, or let it lead to a log"
             if entry.is_dir():
-                words, remedy = "link to a folder", "give what it leads to by its own path"
-            words = f"{words} passed over"
-            self.checks.append(Check.of("X11", "warn", words, entry, f"{remedy}, if it is meant"))
+                words = "link to a folder passed over"
+                remedy = "give what it leads to by its own path, if that is meant"
+            self.checks.append(Check.of("X11", "warn", words, entry, remedy))
             self.passed.append(entry)
         elif entry.is_dir() and (entry / PROVENANCE).is_file():
             self.passed += [entry] if (entry / "logs").is_dir() else []
