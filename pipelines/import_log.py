@@ -39,6 +39,7 @@ from pipelines.io.parquet import write_table
 from pipelines.io.results import NOT_STORED
 from pipelines.io.robot import RobotDescription
 from pipelines.io.sandbox import regular_file
+from pipelines.io.schema import Array
 from pipelines.quality.subject import many
 from pipelines.report.report import Figure, Report, Section, Table
 from pipelines.stage import Inputs, Request, Stage, slug
@@ -74,6 +75,19 @@ class Settings:
 
 
 @dataclass(frozen=True)
+class Preview:
+    """Every Nth sample of a log, for the report's figure: one short text a column.
+
+    In a result.h5 they would lie among logs of the same ending, and one line a number would make
+    most of result.json.
+    """
+
+    t: str  # [s]
+    q: tuple[str, ...]  # [rad] one a joint
+    tau: tuple[str, ...]  # [N m] one a joint
+
+
+@dataclass(frozen=True)
 class ImportedLog:
     """One log: what it is, where it came from, what was done to it."""
 
@@ -89,7 +103,7 @@ class ImportedLog:
     sources: tuple[SourceFile, ...]
     steps: tuple[str, ...]  # units, signs, transmission
     altered: tuple[str, ...]  # repairs, unwrapping, resampling: what makes it a derived log
-    preview: tuple[str, ...]  # every Nth sample of t, q and tau: one short text a column
+    preview: Preview | None  # of the first logs
     log: ExperimentLog = field(metadata=NOT_STORED, repr=False)
 
 
@@ -156,7 +170,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
                 sources=files,
                 steps=tuple(done.steps),
                 altered=tuple(done.altered),
-                preview=_preview(log) if len(logs) < REPAIR.previews else (),
+                preview=_preview(log) if len(logs) < REPAIR.previews else None,
                 log=replace(log, name=name),
             )
         )
@@ -173,8 +187,9 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
 def _import(
     source: Source, material: Material, mapped: Map, settings: Settings, checks: list[Check]
 ) -> list[tuple[ExperimentLog, tuple[SourceFile, ...], Converted]]:
-    """Return the logs of one recording, with files and treatment; several where its clock was set
-    back.
+    """Return the logs of one recording, with files and treatment.
+
+    There are several where its clock was set back.
     """
     recipe, trust, missing = material.recipe, settings.trust_units, material.recipe.missing
     limits = Limits(
@@ -252,10 +267,13 @@ def _on_one_clock(
         done.altered.append(words)
 
 
-def _preview(log: ExperimentLog) -> tuple[str, ...]:
+def _preview(log: ExperimentLog) -> Preview:
     every = max(1, -(-log.n_samples // REPAIR.preview_points))
-    columns = np.column_stack([log.t, log.q, log.tau])[::every].T
-    return tuple(" ".join(f"{x:.6g}" for x in column) for column in columns.tolist())
+
+    def words(values: Array, digits: int = 4) -> str:
+        return " ".join(f"{x:.{digits}g}" for x in values[::every].tolist())
+
+    return Preview(words(log.t, 6), tuple(map(words, log.q.T)), tuple(map(words, log.tau.T)))
 
 
 def write(result: Result, folder: Path, request: Request) -> None:
@@ -290,7 +308,7 @@ def report(result: Result) -> Report:
     ]
     drawn = f"Drawn are the first {REPAIR.previews} of {n} logs; rrrid inspect draws more."
     text = (drawn,) if n > REPAIR.previews else ()
-    figures = tuple(_figure(item) for item in logs if item.preview)
+    figures = tuple(_figure(item, item.preview) for item in logs if item.preview)
     sections = [Section("Logs", text, tables=(Table(head, tuple(rows)),), figures=figures)]
     if tables:
         names = ("table", "from", "columns", "rows")
@@ -315,15 +333,18 @@ def report(result: Result) -> Report:
     return Report("Import", words, "attention" if said_any else "good", sections=tuple(sections))
 
 
-def _figure(item: ImportedLog) -> Figure:
+def _figure(item: ImportedLog, preview: Preview) -> Figure:
+    def numbers(*texts: str) -> Array:
+        return np.array([text.split() for text in texts], dtype=np.float64).T
+
     def draw(figure: Any) -> None:
         from pipelines.report.figures import draw_joint_signals, joint_axes
 
-        t, *columns = (np.array(text.split(), dtype=np.float64) for text in item.preview)
-        halves = (("q", "rad", columns[: item.joints]), ("tau", "N m", columns[item.joints :]))
-        for part, (name, unit, half) in zip(figure.subfigures(1, 2), halves, strict=True):
-            axes, values = joint_axes(part, item.joints), np.column_stack(half)
-            draw_joint_signals(axes, t, values, unit, quantity=name)
+        t = numbers(preview.t)[:, 0]
+        signals = (("q", preview.q, "rad"), ("tau", preview.tau, "N m"))
+        for part, (name, texts, unit) in zip(figure.subfigures(1, 2), signals, strict=True):
+            axes = joint_axes(part, item.joints)
+            draw_joint_signals(axes, t, numbers(*texts), unit, quantity=name)
 
     title = f"{item.name}: position and torque of each joint as they are in the log."
     described = f"position and torque of log {item.name} against time"

@@ -243,6 +243,7 @@ def test_pictures_stay_out_of_the_json_and_their_number_is_said(folder: Path) ->
         write(folder, text(good()), f"{name}.csv")
     outcome = run(folder)
     assert len(json.dumps(outcome.json)) < 30_000
+    assert [log["preview"] and list(log["preview"]) for log in outcome.json["logs"]] == [["t", "q", "tau"]] * 3 + [None]
     assert "first 3 of 4 logs" in outcome.report.sections[0].text[0]
 
 
