@@ -3,7 +3,7 @@ stick-slip.
 
     python -m benchmarks.friction_nuisances --out FOLDER [--kinds rests 12-bit] [--count 30]
 
-Each kind draws its machines from tests/model/friction/closed_loop.py and fits them with the
+Each kind draws its machines from tests/friction/closed_loop.py and fits them with the
 defaults of `rrrid fit-friction`. Values judged: the inertia, and the friction curve at a quarter,
 half and nine tenths of the fastest speed, both ways, each within two of its standard deviations or
 not. Of a drift: whether it is named, and as what. Machines that are done are not done again.

@@ -45,20 +45,16 @@ def clean(text: object, limit: int | None = 400) -> str:
     line = " ".join(_CONTROL.sub("", str(text).encode("utf-8", "replace").decode("utf-8")).split())
     if limit is None or len(line) <= limit:
         return line
-    words, _, last = line[: limit - 1].rpartition(
-        " "
-    )  # no word is cut, but one that is half of the text
+    # no word is cut, but one that is half of the text
+    words, _, last = line[: limit - 1].rpartition(" ")
     return f"{words} …" if len(last) < limit // 2 else f"{line[: limit - 1]}…"
 
 
 def escaped(path: object) -> str:
     """`path` as one printable line that still names it: control characters as \\x1b."""
     text = str(path).encode("utf-8", "backslashreplace").decode("utf-8")
-    return re.sub(
-        rf"{_CONTROL.pattern}|[\t\n]",
-        lambda found: found[0].encode("unicode_escape").decode(),
-        text,
-    )
+    signs = rf"{_CONTROL.pattern}|[\t\n]"
+    return re.sub(signs, lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
 def did_you_mean(word: str, known: Iterable[str], most: int = 1, near_by: float = 0.6) -> str:
@@ -67,18 +63,13 @@ def did_you_mean(word: str, known: Iterable[str], most: int = 1, near_by: float 
     Args:
         near_by: ratio of Ratcliff and Obershelp from which a name is near; 1: the same word.
     """
-    bare = {
-        name.lstrip("-"): name for name in known
-    }  # what every option begins with makes no two of them alike
-    near = [
-        f"'{bare[name]}'"
-        for name in difflib.get_close_matches(word.lstrip("-"), list(bare), n=most, cutoff=near_by)
-    ]
-    return (
-        f", did you mean {' or '.join(filter(None, (', '.join(near[:-1]), near[-1])))}?"
-        if near
-        else ""
-    )
+    # what every option begins with makes no two of them alike
+    bare = {name.lstrip("-"): name for name in known}
+    found = difflib.get_close_matches(word.lstrip("-"), list(bare), n=most, cutoff=near_by)
+    if not found:
+        return ""
+    *others, last = (f"'{bare[name]}'" for name in found)
+    return f", did you mean {', '.join(others)}{' or ' if others else ''}{last}?"
 
 
 class RrridError(Exception):
@@ -98,9 +89,8 @@ class RrridError(Exception):
         self.message = clean(message)
         self.where = clean(where)
         self.remedy = clean(remedy)
-        self.others: tuple[
-            RrridError, ...
-        ] = ()  # of the same work, found in parts that do not depend on this one
+        # of the same work, found in parts that do not depend on this one
+        self.others: tuple[RrridError, ...] = ()
         super().__init__(str(self))
 
     def __str__(self) -> str:
@@ -128,11 +118,9 @@ def _sentence(text: str) -> str:
 def _capital(text: str) -> str:
     """`text` with a capital, unless its first word is a name, an option or a value: h5, --out."""
     first = text.split()[0].rstrip(",.:;")
-    return (
-        text
-        if first == "rrrid" or not (first.isalpha() and first.islower())
-        else text[0].upper() + text[1:]
-    )
+    if first == "rrrid" or not (first.isalpha() and first.islower()):
+        return text
+    return text[0].upper() + text[1:]
 
 
 def _rebuild(

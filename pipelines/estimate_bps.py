@@ -108,7 +108,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     Raises:
         NothingMatched: C06, no log to fit.
         UsageError: C02, settings that do not fit, logs of several robots, or another's model.
-        InputRejected: the doctor rejects a log: its first reason; S23, S24, S25, the torque lacks
+        InputRejected: `inspect` rejects a log: its first reason; S23, S24, S25, the torque lacks
             gravity, has one of another direction, or has no sign; S13, S14, S15, T06, torque and
             motion of a log do not belong together; T04, no stretch of a log can be used; T08, too
             few equations are left; D14, a log that is fitted shall judge as well.
@@ -188,7 +188,7 @@ def _rigid_body_alone(fitted: Fitted, means: Motions, settings: Settings) -> tup
 
 
 def _accepted(logs: list[ExperimentLog]) -> list[tuple[Subject, list[Check]]]:
-    """Return what the doctor says of every log; of D09 the estimate itself knows.
+    """Return what `inspect` says of every log; of D09 the estimate itself knows.
 
     Raises:
         InputRejected: the first reason to reject one.

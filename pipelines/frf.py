@@ -92,7 +92,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     Raises:
         NothingMatched: C06, no frf log.
         UsageError: C02, settings that do not fit, or logs of several robots.
-        InputRejected: the doctor rejects a log, or no spectrum can be taken of it: S01, T05, T08,
+        InputRejected: `inspect` rejects a log, or no spectrum can be taken of it: S01, T05, T08,
             D09.
     """
     band = (settings.low, settings.high)

@@ -55,7 +55,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
 
     Raises:
         NothingMatched: all logs are plans.
-        InputRejected: the doctor rejects a log: its first reason.
+        InputRejected: `inspect` rejects a log: its first reason.
         UsageError: C02, settings that do not fit.
     """
     taken: set[str] = set()

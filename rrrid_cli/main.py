@@ -136,9 +136,8 @@ def _as_error(problem: BaseException, words: Iterable[str]) -> RrridError:
             return problem
         what, remedy = "the folder that the command was called in", "call it from another (cd)"
         return EnvironmentFault("P02", f"{what} was deleted", "working folder", remedy)
-    names: dict[
-        str, str
-    ] = {}  # absolute paths, as stages have them -> as the command line has them
+    # absolute paths, as stages have them -> as the command line has them
+    names: dict[str, str] = {}
     for text in (part for word in words for part in (word, word.partition("=")[2])):
         path = Path(text)
         if text and not text.startswith("-") and not path.is_absolute():
@@ -224,7 +223,8 @@ def _prepare_streams(as_json: bool) -> None:
             null = os.open(os.devnull, os.O_RDWR)
             if null != number:  # a later file must not take the number
                 os.dup2(null, number)
-            setattr(sys, name, open(number, "r" if number == 0 else "w", encoding="utf-8"))  # noqa: SIM115
+            mode = "r" if number == 0 else "w"
+            setattr(sys, name, open(number, mode, encoding="utf-8"))  # noqa: SIM115
     for name, change in (("json", lambda text: json.dumps(text)[1:-1]), ("plain", _simplified)):
         codecs.register_error(f"rrrid-{name}", partial(_replaced, change))
     for stream in (sys.stdout, sys.stderr):

@@ -171,16 +171,16 @@ def _derived(
 
 
 def examine(log: ExperimentLog, recording: str, trust_units: bool) -> tuple[Check, ...]:
-    """Return the warnings of the doctor about a new log, so that `inspect` passes on it.
+    """Return the warnings of `inspect` about a new log, so that it passes there.
 
     They are glitches (D06), which stay for the user of the log to decide, and time in another unit
     (S08), which can be wrong by a thousand and contradict nothing; the import has said the others.
 
     Raises:
-        InputRejected: S20 unlike the format, and what the doctor would reject or repair before
+        InputRejected: S20 unlike the format, and what `inspect` would reject or repair before
             use: the import should have.
     """
-    refuse_unlike_format(log)  # the doctor judges a log whose joint and gains are the robot's
+    refuse_unlike_format(log)  # `inspect` judges a log whose joint and gains are the robot's
     found = []
     for check in check_log(replace(log, source=recording), TRUSTED if trust_units else ()):
         kept = (check.code, check.level) == ("RRID-D06", "repair")

@@ -90,9 +90,10 @@ def diagnosis_report(result: Result) -> Report:
     units, nominal, after = units_in(result), result.residual_rms, result.after_rms
     sections = [*boundary_card(result.boundary)]
     for number, one in enumerate(result.findings, 1):
-        left = {"beside": result.findings, "left": after.validate}
-        sections.append(finding_section(number, one, nominal, units=units, **left))  # type: ignore[arg-type]
-        sections.append(numbers_section(number, one, units, result.findings))
+        found = finding_section(
+            number, one, nominal, units=units, beside=result.findings, left=after.validate
+        )
+        sections += [found, numbers_section(number, one, units, result.findings)]
     sections += _unknown(result)
     sections += picture_sections(result, result.rated, units, floor_words(result))
     sections += [*_baseline(result), *_rejected(result), *_candidates(result)]

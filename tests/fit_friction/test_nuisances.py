@@ -1,7 +1,7 @@
 """Rests, a vertical axis, a coarse encoder and friction that drifts, as logs of a joint in a position loop show them.
 
 Recorded cases: ../shared/cases, made by a program of their own (LuGre friction, PD loop); see each README there. Machines
-under gravity: tests/model/friction/closed_loop.py.
+under gravity: tests/friction/closed_loop.py.
 """
 
 from __future__ import annotations
