@@ -6,7 +6,8 @@
     friction = rrrid.fit_friction(logs)
     model = rrrid.estimate(friction)
     found = rrrid.diagnose(model)
-    better = rrrid.extend(found).save("runs/extended")
+    folder = rrrid.extend(found).save("runs/extended")
+    rrrid.export(folder / "model.json", to="urdf").save("runs/urdf")
 
 Each function takes what `load` or another function returned, and hands on to the next one what
 `rrrid run` would: logs that can be used, friction laws, the model, the causes. Options are those of
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from pipelines.diagnosis.result import Extension
     from pipelines.errors import Check
     from pipelines.estimate_bps import Result as Estimate
+    from pipelines.export_model import Result as Exported
     from pipelines.fit_friction import Result as Friction
     from pipelines.frf import Result as Responses
     from pipelines.inspect import Result as Examination
@@ -50,6 +52,7 @@ __all__ = [
     "design",
     "diagnose",
     "estimate",
+    "export",
     "extend",
     "fit_friction",
     "frf",
@@ -77,7 +80,7 @@ _ROWS = {
 _ROLES = {"identify", "validate", "reference"}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Answer(Generic[R]):
     """What a stage found in some logs; nothing is written before `save`."""
 
@@ -166,6 +169,9 @@ class Answer(Generic[R]):
         found.write(out)
         return out
 
+    def __repr__(self) -> str:
+        return f"<{self.found.stage.name}: {self.summary}>"
+
     def _repr_html_(self) -> str:
         """Return the verdict, the checks and the key figures for a notebook."""
         from pipelines.report.render import in_short
@@ -215,7 +221,11 @@ def load(
 
 
 def _listed(paths: str | Path | Sequence[str | Path]) -> list[str]:
-    return [str(one) for one in ([paths] if isinstance(paths, str | Path) else paths)]
+    given = [paths] if isinstance(paths, str | Path) else paths
+    if not isinstance(given, Sequence) or not all(isinstance(x, str | Path) for x in given):
+        words = f"{paths!r} names no logs"
+        raise UsageError("C02", words, "load", "give a path, or a list of paths")
+    return [str(one) for one in given]
 
 
 def fit_friction(given: Answer[Any], **options: Any) -> Answer[Friction]:
@@ -281,10 +291,28 @@ def design(robot: str | Path | None = None, **options: Any) -> Answer[Design]:
     return Answer(answered(STAGE, request, settings, read(request, settings), {}, started))
 
 
+def export(model: str | Path, to: str) -> Answer[Exported]:
+    """Bring a model into the format of another program, with a proof of what it carries.
+
+    Args:
+        model: a model.json, as `save` of `estimate` or `extend` writes it.
+        to: "urdf", "mjcf", "c" or "json".
+    """
+    from pipelines.export_model import STAGE, Settings, read
+    from pipelines.stage import Request, answered
+
+    settings = _settings(Settings(), {"model": str(model), "to": to}, "export")
+    request, started = Request(()), time.time()
+    return Answer(answered(STAGE, request, settings, read(request, settings), {}, started))
+
+
 def _next(module: str, given: Answer[Any], options: dict[str, Any]) -> Answer[Any]:
     """Return the answer of a stage to what another one hands on."""
     from pipelines.stage import Stage, answered, handed_on
 
+    if not isinstance(given, Answer):
+        words, remedy = f"{given!r} is no answer", "read the logs first: rrrid.load(paths)"
+        raise UsageError("C02", words, module, remedy)
     if roles := _ROLES.intersection(options):
         remedy = "name them when the logs are read: load(paths, roles={...})"
         raise UsageError("C02", f"logs of role {min(roles)}", module, remedy)

@@ -145,17 +145,20 @@ def print_table(
 
     from pipelines.report.report import are_numbers
 
-    table, needed = Table(box=None, pad_edge=False, show_header=bool(head), header_style="none"), 0
+    table = Table(box=None, pad_edge=False, show_header=bool(head), header_style="none")
     columns = [[clean(cell, 200) for cell in column] for column in zip(*rows, strict=True)]
-    for name, cells in zip(head or [""] * len(columns), columns, strict=True):
-        least = max(map(len, (*cells, *name.split())))
-        needed += least + 2
+    names = list(head) or [""] * len(columns)
+    each = zip(names, columns, strict=True)
+    least = [max(map(len, (*cells, *name.split()))) for name, cells in each]
+    whole = [max(len(name), room) for name, room in zip(names, least, strict=True)]
+    rooms = whole if sum(whole) + 2 * len(whole) <= width else least  # long headings break
+    for name, cells, room in zip(names, columns, rooms, strict=True):
         side: Any = "right" if head and are_numbers(cells) else "left"
-        wide = least >= len(name)
-        table.add_column(name, justify=side, vertical="bottom", min_width=least, no_wrap=wide)
+        table.add_column(name, justify=side, vertical="bottom", width=room)
     for row in zip(*columns, strict=True):
         table.add_row(*row)
-    lines = Console(file=io.StringIO(), width=max(width - 2, needed), markup=False, highlight=False)
+    room = sum(rooms) + 2 * len(rooms)
+    lines = Console(file=io.StringIO(), width=room, markup=False, highlight=False)
     with lines.capture() as drawn:
         lines.print(table)
     for line in drawn.get().splitlines():

@@ -127,3 +127,22 @@ def test_description_that_was_given_is_among_the_hashed_inputs(tmp_path: Path):
     given.write_text(robot.read_text())
     found = rrrid.load(LOGS / "hold-1.h5", robot=str(given)).found
     assert given in found.hashes
+
+
+def test_what_is_no_answer_is_refused_with_what_to_do():
+    with pytest.raises(UsageError, match="load"):
+        rrrid.estimate("sample_logs/rrr-changed")  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="no logs"):
+        rrrid.load(3)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="tuple"):
+        rrrid.extend(rrrid.load(LOGS / "hold-1.h5"), **{"causes": "cogging:2"})
+
+
+def test_answer_is_shown_in_one_line(model: rrrid.Answer):
+    assert repr(model) == f"<estimate-bps: {model.summary}>"
+
+
+def test_model_is_exported(model: rrrid.Answer, tmp_path: Path):
+    folder = model.save(tmp_path / "own")
+    exported = rrrid.export(folder / "model.json", to="json").save(tmp_path / "exported")
+    assert any(path.suffix == ".json" and path.name != "result.json" for path in exported.iterdir())

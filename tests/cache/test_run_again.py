@@ -161,7 +161,7 @@ def test_changed_code_and_libraries(small: Path, monkeypatch: pytest.MonkeyPatch
         {"pipelines.estimation.smoother": "other"} if module == "pipelines.reconstruct" else {}))
     planned = run.plan(Request((small / "logs",), out=small / "out"), SHORT)
     assert [(one.stage, one.why) for one in planned if one.computed] == [
-        ("reconstruct", "code of signal.smoother"), ("frf", "reconstruct before it changed")]
+        ("reconstruct", "code of estimation.smoother"), ("frf", "reconstruct before it changed")]
     monkeypatch.setattr(cache, "code_of", code)
     monkeypatch.setattr(cache, "libraries", lambda *names: {"numpy": "0.1"})
     assert all(one.computed and "numpy" in one.why for one in run.plan(Request((small / "logs",), out=small / "out"), SHORT))

@@ -134,3 +134,12 @@ def test_a_terminal_shows_the_step_and_is_left_clean(monkeypatch: pytest.MonkeyP
     assert "searching [bold] " in shown
     assert "0:00:00" in shown
     assert shown.endswith("\x1b[1A\x1b[2K")
+
+
+def test_no_column_of_a_table_is_cut(capsys: pytest.CaptureFixture[str]) -> None:
+    """Long headings break between words; every cell is there whole, also in the last column."""
+    head = ["log", "samples", "speed std [rad/s]", "acceleration std [rad/s²]", "whiteness of the innovations", "farthest from it [rad/s²]"]
+    row = ["excitation-1-commissioning", "20000", "0.00123", "0.2207", "12.3", "0.2208"]
+    print_table(head, [row])
+    *_, last = capsys.readouterr().out.splitlines()
+    assert last.split() == row
