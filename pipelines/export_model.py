@@ -34,7 +34,13 @@ from pipelines.export.table import TABLE
 from pipelines.export.target import Cause, Held, Loaded, Target, folded, held_by, rms
 from pipelines.export.urdf import URDF
 from pipelines.io.log import ExperimentLog, recording
-from pipelines.io.model_file import ModelFile, read_covariance, read_model, write_covariance
+from pipelines.io.model_file import (
+    ModelFile,
+    model_in,
+    read_covariance,
+    read_model,
+    write_covariance,
+)
 from pipelines.io.option import option
 from pipelines.io.output import write_text
 from pipelines.io.schema import joint_unit
@@ -55,7 +61,9 @@ _BODIES = ("urdf", "mjcf")  # whose readers need every number of a link
 class Settings:
     """Choose the model and the target."""
 
-    model: str = option("", "The model.json of estimate-bps or extend, or 'rrr'.", "MODEL")
+    model: str = option(
+        "", "A model.json, or a folder of estimate-bps, extend or run; or 'rrr'.", "MODEL"
+    )
     to: str = option("urdf", "urdf, mjcf, c or json.")
 
 
@@ -66,6 +74,7 @@ class _Material:
     model: ModelFile
     arm: Arm
     covariance: Array  # (base parameters, base parameters); NaN where nothing is known
+    source: str  # the model.json that was taken of a folder
 
 
 def read(request: Request, settings: Settings) -> Inputs:
@@ -73,7 +82,7 @@ def read(request: Request, settings: Settings) -> Inputs:
 
     Raises:
         UsageError: C02, no model or no such target was named, or a model without inertia; C04, no
-            such file.
+            such file, or a folder without a model.
         InputRejected: S18, it is no model file, or the covariance is of another; S02, a log of
             another robot, or without torque.
     """
@@ -83,8 +92,12 @@ def read(request: Request, settings: Settings) -> Inputs:
     if not settings.model:
         remedy = "name a model.json, or the shipped 'rrr'"
         raise UsageError("C02", "no model", where="export", remedy=remedy)
-    path = Path(settings.model).absolute()
-    model = read_model(settings.model)
+    given, source = Path(settings.model).absolute(), ""
+    path = given
+    if given.is_dir():
+        path = model_in(given)
+        source = f"{path.relative_to(given)} of the folder {given.name}"
+    model = read_model(path if source else settings.model)
     arm = Arm.from_model(model, path)
     if not arm.p.any():
         words = f"the model {path.name} holds friction alone, no inertia"
@@ -108,7 +121,7 @@ def read(request: Request, settings: Settings) -> Inputs:
         covariance = known[np.ix_(places, places)]
         sources.append(beside)
     found = replace(inputs, sources=(*inputs.sources, *sources), robot_name=arm.robot.name)
-    material = _Material(model, arm, covariance)
+    material = _Material(model, arm, covariance, source)
     return replace(found, label=f"{model.name}-{settings.to}", material=material)
 
 
@@ -164,6 +177,7 @@ def compute(inputs: Inputs, settings: Settings) -> Card:
         validity,
         texts,
         links.covariance,
+        known.source,
     )
 
 

@@ -89,6 +89,7 @@ class Card:
     validity: Validity | None
     texts: Mapping[str, str] = field(metadata=NOT_STORED, repr=False)
     covariance: Array = field(metadata=NOT_STORED, repr=False)
+    source: str = ""  # the model.json that was taken of a folder
 
     def count(self, carried: str) -> int:
         """Return how many causes are carried so."""
@@ -113,7 +114,8 @@ def card(result: Card) -> Report:
         worst = float(np.max(result.torque_error / np.maximum(result.torque_rms, 1e-300)))
     verdict = sentence("export", "verdict", result, worst)
     tone: Tone = "good" if good else "attention"
-    return Report("Export", verdict, tone, sections=tuple(sections))
+    basis = (f"model: {result.source}",) if result.source else ()
+    return Report("Export", verdict, tone, sections=tuple(sections), basis=basis)
 
 
 def _causes(result: Card) -> Table:

@@ -19,7 +19,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pipelines.errors import InputRejected
+from pipelines.errors import InputRejected, UsageError
 from pipelines.io.config import FORMAT as LIMITS
 from pipelines.io.output import write_text
 from pipelines.io.results import encode, json_text
@@ -123,7 +123,7 @@ def read_model(source: str | Path) -> ModelFile:
     path = Path(source)
     if not path.exists():
         path = shipped("models", str(source))
-    size = regular_file(path).st_size
+    size = regular_file(path, what="a model.json").st_size
     if size > LIMITS.model:
         raise _wrong(f"{size} bytes are too many", path)
     try:
@@ -131,6 +131,19 @@ def read_model(source: str | Path) -> ModelFile:
     except (OSError, UnicodeDecodeError) as problem:
         raise _wrong(f"it cannot be read: {problem}", path) from None
     return parse_model(text, where=path)
+
+
+def model_in(folder: Path) -> Path:
+    """Return the model.json of a folder of results; of `run` that of extend, else estimate-bps.
+
+    Raises:
+        UsageError: C04, there is none.
+    """
+    for name in ("model.json", "extend/model.json", "estimate-bps/model.json"):
+        if (folder / name).is_file():
+            return folder / name
+    remedy = "give a model.json, or a folder that estimate-bps, extend or run has left"
+    raise UsageError("C04", "a model is wanted, and this folder has no model.json", folder, remedy)
 
 
 def _wrong(words: str, where: object) -> InputRejected:

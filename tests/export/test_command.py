@@ -140,6 +140,31 @@ def test_nothing_is_written_of_what_is_refused(settings: Settings, kind: type[Rr
     assert not (tmp_path / "out").exists()
 
 
+def test_the_model_of_a_folder_of_results_is_taken(tmp_path: Path) -> None:
+    """Of `run` that of extend, else estimate-bps; the terminal and the page say which."""
+    run = tmp_path / "mine"
+    for name in ("estimate-bps", "extend"):
+        (run / name).mkdir(parents=True)
+        write_model(run / name / "model.json", replace(synthetic_arm(), name=name).to_model())
+    for folder, name, said in ((run, "extend", "extend/model.json of the folder mine"),
+                               (run / "extend", "extend", "model.json of the folder extend"),
+                               (run, "estimate-bps", "estimate-bps/model.json of the folder mine")):
+        outcome = export(tmp_path, Settings(str(folder), "json"))
+        assert (outcome.result.model, outcome.report.basis) == (name, (f"model: {said}",))
+        assert f"The model is {said}." in (outcome.folder / "report.html").read_text()
+        if folder != run:
+            shutil.rmtree(folder)
+
+
+def test_a_folder_without_a_model_says_what_is_wanted(tmp_path: Path) -> None:
+    """Wrong usage, as of a file that is not there."""
+    (tmp_path / "logs").mkdir()
+    with pytest.raises(UsageError, match="RRID-C04 .*logs: a model is wanted") as problem:
+        export(tmp_path, Settings(str(tmp_path / "logs")))
+    assert "estimate-bps, extend or run" in problem.value.remedy
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_model_without_inertia_says_what_to_measure(tmp_path: Path) -> None:
     """The model.json of fit-friction has no links."""
     arm = synthetic_arm()
