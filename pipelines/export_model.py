@@ -178,6 +178,7 @@ def compute(inputs: Inputs, settings: Settings) -> Card:
         texts,
         links.covariance,
         known.source,
+        target.reader(held),
     )
 
 

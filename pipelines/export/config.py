@@ -26,6 +26,9 @@ class ExportConfig:
     # [s] of MuJoCo's dry friction: its own, 0.02, lets joints creep; a simulated log of the test
     # bench is then 17 % farther off than by the model, and 4 % with this one
     friction_time: float = 0.004
+    mujoco: str = "3.3.1"  # the oldest that the extra `export` allows: it reads all but polynomials
+    # whose joints have polynomials of damping and stiffness: 3.6 refuses them, 3.7 reads them
+    mujoco_polynomials: str = "3.7"
     window: float = 0.1  # [s] over which a log is simulated from its own states
     compile_seconds: float = 120.0  # [s] until a compiler is given up
 

@@ -1,8 +1,9 @@
-"""Write an MJCF model for MuJoCo 3.3 and later, and load it again.
+"""Write an MJCF model for MuJoCo, and load it again.
 
 Source   mujoco.readthedocs.io, XML reference: body/joint, actuator/general
 
-Where the installed MuJoCo reads them, damping and stiffness are polynomials of three terms:
+Where the installed MuJoCo reads them, damping and stiffness are polynomials of three terms, which
+an older one refuses; the card says which MuJoCo a file needs:
 
     damping   a v + b v |v| + c v^3            stiffness   k x + l x^2 + m x^3,  x = q - springref
 
@@ -45,7 +46,14 @@ def mjcf() -> Target:
     columns = 4 if polynomials else 2
     carry = partial(_carry, polynomials=polynomials)
     return Target(
-        carry, _write, _load, "mujoco", columns=columns, forward_only=forward, simulate=_simulate
+        carry,
+        _write,
+        _load,
+        "mujoco",
+        columns=columns,
+        forward_only=forward,
+        simulate=_simulate,
+        reader=_reader,
     )
 
 
@@ -81,6 +89,13 @@ def _write(held: Held) -> tuple[dict[str, str], tuple[str, ...]]:
         if math.isfinite(joint.velocity)
     ]
     return {f"{held.name}.xml": text_of(root)}, tuple(notes)
+
+
+def _reader(held: Held) -> str:
+    """Return the oldest MuJoCo that reads the file."""
+    values = (values for terms in held.terms for values in (terms.damping, terms.stiffness))
+    polynomial = any(any(higher) for _, *higher in values)
+    return f"MuJoCo {EXPORT.mujoco_polynomials if polynomial else EXPORT.mujoco} or later"
 
 
 def _place(placement: Placement) -> dict[str, str]:

@@ -134,6 +134,7 @@ class Target:
     forward_only: tuple[str, ...] = ()  # carried in a simulation, not in inverse dynamics
     # positions in windows of a log, where the target simulates
     simulate: Callable[..., Array | None] | None = None
+    reader: Callable[[Held], str] = lambda held: ""  # which version of it the file needs
     # written with an error that is measured, and how
     approximated: Mapping[str, str] = field(default_factory=dict)
 

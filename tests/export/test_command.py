@@ -156,6 +156,19 @@ def test_the_model_of_a_folder_of_results_is_taken(tmp_path: Path) -> None:
             shutil.rmtree(folder)
 
 
+@pytest.mark.parametrize(("cause", "version"), [("viscous", "3.3.1"), ("quadratic_drag", "3.7")])
+def test_the_mujoco_that_a_file_needs_is_told(cause: str, version: str, tmp_path: Path) -> None:
+    """Polynomials of damping came with 3.7: in the verdict, in the result, on the card."""
+    arm = replace(synthetic_arm(), friction=(caused(cause, 1, coefficient=0.1),))
+    write_model(tmp_path / "model.json", arm.to_model())
+    outcome = export(tmp_path, Settings(str(tmp_path / "model.json"), "mjcf"))
+    (xml,) = outcome.result.texts.values()
+    assert ('damping="0.1"' in xml) == (version == "3.3.1")
+    assert outcome.json["reader"] == f"MuJoCo {version} or later"
+    assert f"The file needs MuJoCo {version} or later." in outcome.report.verdict
+    assert f"The file needs MuJoCo {version} or later;" in (outcome.folder / "report.html").read_text()
+
+
 def test_a_folder_without_a_model_says_what_is_wanted(tmp_path: Path) -> None:
     """Wrong usage, as of a file that is not there."""
     (tmp_path / "logs").mkdir()
