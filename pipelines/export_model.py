@@ -139,7 +139,7 @@ def compute(inputs: Inputs, settings: Settings) -> Card:
     covariance = known.covariance
     if flat.body is not arm.body:  # a tilted base or a longer link has other base parameters
         covariance = carried(covariance, carry_over(arm.body, flat.body))
-    links = consistent_links(flat.body, flat.p, covariance)
+    links = _told(consistent_links(flat.body, flat.p, covariance))
     states, (_, assumed, impossible) = random_states(arm.robot, validity), prior_links(arm.robot)
     if settings.to in _BODIES and assumed and not links.exact:
         Plant.of(arm).refuse_unphysical(states.q)  # the assumed links alone would make it move
@@ -180,6 +180,13 @@ def compute(inputs: Inputs, settings: Settings) -> Card:
         known.source,
         target.reader(held),
     )
+
+
+def _told(links: Links) -> Links:
+    """Return the links whose covariance is NaN where the logs tell nothing: it is not zero there."""
+    untold = np.array(["logs" not in origin for origin in links.origin])
+    covariance = np.where(untold | untold[:, None], np.nan, links.covariance)
+    return replace(links, covariance=covariance)
 
 
 def _proof(target: Target, held: Held, states: Motion) -> Proof | None:

@@ -1,7 +1,7 @@
 """Write a flat JSON table: frames of the joints, and every number with std, unit and origin.
 
 A row has `of` ("link", "base", "friction" or "effect"), `place`, `name`, `value`, `std`, `unit`,
-`origin`. Link parameters are about the link's frame: m, first moments, moments and products of
+`origin`; a `std` that the logs do not tell is null. Link parameters are about the link's frame: m, first moments, moments and products of
 inertia, products with positive sign, Ixy = +∫xy dm. The base parameters are those of the
 links of the same table: the model's own, but where no links that could exist have these.
 """
@@ -21,6 +21,7 @@ from pipelines.dynamics.chain import STANDARD, inverse_dynamics
 from pipelines.dynamics.kinematics import Placement, SerialChain
 from pipelines.effects import find_effect
 from pipelines.export.target import Held, Loaded, Target
+from pipelines.io.model_file import UNKNOWN
 from pipelines.io.results import encode, json_text
 
 __all__ = ["TABLE"]
@@ -46,6 +47,7 @@ def _write(held: Held) -> tuple[dict[str, str], tuple[str, ...]]:
                 rows.append((kind, acting.place, q.name, q.value, q.std, q.unit, q.origin))
     table = {
         "format": "rrrid-export",
+        **UNKNOWN,
         "model": held.arm.name,
         "gravity": held.gravity,
         "joints": joints,

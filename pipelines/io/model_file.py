@@ -31,6 +31,8 @@ FORMAT = "rrrid-model"
 FORMAT_VERSION = 1  # numerics
 
 Origin = Literal["fitted", "known", "assumed"]
+# what the files say of their own null
+UNKNOWN = {"null": "not told by the logs: not zero, and not known exactly"}
 # one [low, high] a joint, null where the logs do not say
 Ranges = tuple[tuple[float, float] | None, ...]
 
@@ -221,7 +223,7 @@ def write_model(path: Path, model: ModelFile) -> None:
 
 def write_covariance(path: Path, names: Sequence[str], covariance: Array) -> None:
     """Write the covariance (k, k) of the numbers `names` of a model, atomically."""
-    table = {"names": list(names), "covariance": encode(covariance.tolist())[0]}
+    table = {**UNKNOWN, "names": list(names), "covariance": encode(covariance.tolist())[0]}
     write_text(path, json_text(table))
 
 

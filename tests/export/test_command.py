@@ -51,7 +51,8 @@ def test_what_is_left(to: str, files: set[str], tmp_path: Path) -> None:
     names, covariance = read_covariance(outcome.folder / "covariance.json")
     assert names[:2] == ("m1", "mx1")
     assert covariance.shape == (30, 30)
-    assert np.linalg.eigvalsh(covariance).min() > -1e-12
+    told = np.isfinite(np.diag(covariance))
+    assert np.linalg.eigvalsh(covariance[np.ix_(told, told)]).min() > -1e-12
     assert outcome.exit_code == 0
     assert rerender(outcome.folder, None).verdict == outcome.report.verdict
 
@@ -156,6 +157,21 @@ def test_the_model_of_a_folder_of_results_is_taken(tmp_path: Path) -> None:
             shutil.rmtree(folder)
 
 
+def test_what_the_logs_do_not_tell_is_not_known_exactly(tmp_path: Path) -> None:
+    """Null instead of a variance of zero, in covariance.json and in the table, and both say what null is."""
+    outcome = export(tmp_path, Settings(str(undescribed(tmp_path, std=0.01)), "json"))
+    rows = [row for row in json.loads((outcome.folder / "rrr-synthetic.json").read_text())["table"] if row["of"] == "link"]
+    _, covariance = read_covariance(outcome.folder / "covariance.json")
+    untold = np.array(["logs" not in row["origin"] for row in rows])
+    assert {"assumed", "description", "logs"} <= {row["origin"] for row in rows}
+    assert np.isnan(covariance[untold]).all()
+    assert np.isnan(covariance[:, untold]).all()
+    assert np.isfinite(covariance[np.ix_(~untold, ~untold)]).all()
+    assert [row["std"] is None for row in rows] == untold.tolist()
+    for name in ("covariance.json", "rrr-synthetic.json"):
+        assert "not told by the logs" in json.loads((outcome.folder / name).read_text())["null"]
+
+
 @pytest.mark.parametrize(("cause", "version"), [("viscous", "3.3.1"), ("quadratic_drag", "3.7")])
 def test_the_mujoco_that_a_file_needs_is_told(cause: str, version: str, tmp_path: Path) -> None:
     """Polynomials of damping came with 3.7: in the verdict, in the result, on the card."""
@@ -189,11 +205,11 @@ def test_a_model_without_inertia_says_what_to_measure(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def undescribed(folder: Path, **values: float) -> Path:
+def undescribed(folder: Path, std: float | None = None, **values: float) -> Path:
     """The model.json of the synthetic arm whose shoulder nobody describes, with these base parameters."""
     arm = synthetic_arm()
     joints = tuple(replace(joint, link=None) if k == 1 else joint for k, joint in enumerate(arm.robot.joints))
-    base = tuple(replace(p, value=values.get(p.name, p.value)) for p in arm.base)
+    base = tuple(replace(p, value=values.get(p.name, p.value), std=std) for p in arm.base)
     body = rigid_body(replace(arm.robot, joints=joints))
     write_model(folder / "model.json", replace(arm, body=body, base=base).to_model())
     return folder / "model.json"
