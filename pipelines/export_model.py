@@ -32,7 +32,7 @@ from pipelines.export.mjcf import mjcf
 from pipelines.export.states import course, random_states
 from pipelines.export.table import TABLE
 from pipelines.export.target import Cause, Held, Loaded, Target, folded, held_by, rms
-from pipelines.export.urdf import URDF
+from pipelines.export.urdf import URDF, other_gravity
 from pipelines.io.log import ExperimentLog, recording
 from pipelines.io.model_file import (
     ModelFile,
@@ -178,12 +178,13 @@ def compute(inputs: Inputs, settings: Settings) -> Card:
         texts,
         links.covariance,
         known.source,
+        float(np.linalg.norm(held.gravity)),
         target.reader(held),
     )
 
 
 def _told(links: Links) -> Links:
-    """Return the links whose covariance is NaN where the logs tell nothing: it is not zero there."""
+    """Return the links whose covariance is NaN, and not zero, where the logs tell nothing."""
     untold = np.array(["logs" not in origin for origin in links.origin])
     covariance = np.where(untold | untold[:, None], np.nan, links.covariance)
     return replace(links, covariance=covariance)
@@ -276,6 +277,8 @@ def _checks(result: Card) -> tuple[Check, ...]:
         words = f"{words} mass, centre and inertia that torque does not show are assumed"
         remedy = "give each a [joint.link] with mass, com and inertia, from CAD or weighed"
         found.append(Check.of("S18", "warn", words, result.robot, remedy))
+    if result.target == "urdf" and (words := other_gravity(result.gravity)):
+        found.append(Check.of("S18", "warn", words, result.robot))
     if said.impossible:
         words = f"no body could have the described link of {', '.join(said.impossible)}"
         found.append(Check.of("S17", "warn", words, result.robot, "correct the description"))

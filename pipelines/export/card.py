@@ -90,6 +90,7 @@ class Card:
     texts: Mapping[str, str] = field(metadata=NOT_STORED, repr=False)
     covariance: Array = field(metadata=NOT_STORED, repr=False)
     source: str = ""  # the model.json that was taken of a folder
+    gravity: float = 0.0  # [m/s^2] its size
     reader: str = ""  # which version of the target the file needs, where that matters
 
     def count(self, carried: str) -> int:

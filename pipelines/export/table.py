@@ -1,9 +1,10 @@
 """Write a flat JSON table: frames of the joints, and every number with std, unit and origin.
 
 A row has `of` ("link", "base", "friction" or "effect"), `place`, `name`, `value`, `std`, `unit`,
-`origin`; a `std` that the logs do not tell is null. Link parameters are about the link's frame: m, first moments, moments and products of
-inertia, products with positive sign, Ixy = +∫xy dm. The base parameters are those of the
-links of the same table: the model's own, but where no links that could exist have these.
+`origin`; a `std` that the logs do not tell is null. Link parameters are about the link's frame: m,
+first moments, moments and products of inertia, products with positive sign, Ixy = +∫xy dm. The base
+parameters are those of the links of the same table: the model's own, but where no links that could
+exist have these.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from pipelines.dynamics.kinematics import Placement
 from pipelines.export.config import EXPORT
 from pipelines.export.target import ExportJoint, Held, JointTerms, Loaded, Target, identifier
 
-__all__ = ["URDF", "numbers", "text_of"]
+__all__ = ["URDF", "numbers", "other_gravity", "text_of"]
 
 _LEVEL = 1e-12  # numerics: rounding of gravity
 _DRAKE = "{http://drake.mit.edu}"
@@ -37,9 +37,7 @@ def _write(held: Held) -> tuple[dict[str, str], tuple[str, ...]]:
     mount, flange = identifier("mount", names), identifier(f"{held.tip}_fixed", names)
     ground = identifier("ground", [held.root, held.tip, *(joint.link for joint in held.joints)])
     size = float(np.linalg.norm(held.gravity))
-    if abs(size - EXPORT.standard_gravity) > _LEVEL:
-        words = f"gravity is {size:.6g} m/s^2: set it in the program that reads the URDF"
-        notes.append(f"{words}, which takes {EXPORT.standard_gravity:g}")
+    notes += filter(None, [other_gravity(size)])
     if size and held.gravity[2] / size > -1.0 + _LEVEL:
         words = "gravity does not point along -z of the base: the base hangs turned from"
         notes.append(f"{words} the fixed joint '{mount}', so that it does in the world")
@@ -56,6 +54,14 @@ def _write(held: Held) -> tuple[dict[str, str], tuple[str, ...]]:
     SubElement(robot, "link", name=held.tip)
     _joined(robot, flange, "fixed", parent, held.tip, held.tool)
     return {f"{held.name}.urdf": text_of(robot)}, tuple(notes)
+
+
+def other_gravity(size: float) -> str:
+    """Return words about a gravity [m/s^2] that readers of a URDF do not take; else ""."""
+    if abs(size - EXPORT.standard_gravity) <= _LEVEL:
+        return ""
+    words = f"gravity is {size:.6g} m/s^2: set it in the program that reads the URDF"
+    return f"{words}, which takes {EXPORT.standard_gravity:g}"
 
 
 def text_of(root: Element) -> str:

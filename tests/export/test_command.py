@@ -172,6 +172,14 @@ def test_what_the_logs_do_not_tell_is_not_known_exactly(tmp_path: Path) -> None:
         assert "not told by the logs" in json.loads((outcome.folder / name).read_text())["null"]
 
 
+def test_a_gravity_that_no_urdf_holds_is_a_warning(tmp_path: Path) -> None:
+    """On the terminal, not on the card alone; of a URDF only."""
+    for to, told in (("urdf", True), ("json", False)):
+        found = [check for check in export(tmp_path, Settings("rrr", to)).checks if "gravity is 9.8062 m/s^2" in check.message]
+        assert [check.level for check in found] == ["warn"] * told
+        assert all("set it in the program that reads the URDF, which takes 9.81" in check.message for check in found)
+
+
 @pytest.mark.parametrize(("cause", "version"), [("viscous", "3.3.1"), ("quadratic_drag", "3.7")])
 def test_the_mujoco_that_a_file_needs_is_told(cause: str, version: str, tmp_path: Path) -> None:
     """Polynomials of damping came with 3.7: in the verdict, in the result, on the card."""
