@@ -4,7 +4,7 @@ Reads    a model file, the covariance.json in its folder if there is one, and lo
 Writes   the exported file or files, covariance.json of the link parameters, result.json
 Source   Wensing, Kim & Slotine 2018; Lee & Park 2018 (links that could exist)
 
-Base parameters become links that could exist and have the same torque. Every cause of the model is
+Base parameters become links that could exist and have the same torque. Every term of the model is
 carried exactly, approximated by the friction and damping that the target has, or lost; the card
 says which, and what it costs in torque on a replayed log, or else on a simulated motion. The file
 is loaded again (URDF in Pinocchio, MJCF in MuJoCo, C by the compiler) and its torque compared.
@@ -269,8 +269,8 @@ def _checks(result: Card) -> tuple[Check, ...]:
     for cause in result.causes:
         if cause.carried != "exactly":
             words = f"{cause.place} is {cause.carried} in {result.target}; {_cost(cause, result)}"
-            remedy = "export to c or json, which hold more causes"
-            remedy = "export to json, which holds every cause" if result.target == "c" else remedy
+            remedy = "export to c or json, which hold more terms"
+            remedy = "export to json, which holds every term" if result.target == "c" else remedy
             found.append(Check.of("S18", "warn", words, result.model, remedy))
     if said.assumed and result.target in _BODIES:
         words = f"nothing describes the links of {', '.join(said.assumed)}: those parts of their"

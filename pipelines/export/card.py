@@ -99,12 +99,12 @@ class Card:
 
 
 def card(result: Card) -> Report:
-    """Return the card: causes, proof, links, validity."""
+    """Return the card: terms, proof, links, validity."""
     good = (
         not result.consistency.conflicts and result.proof is not None and not result.count("lost")
     )
     sections = [
-        Section("Causes", paragraphs("export", "causes", result), (_causes(result),)),
+        Section("Terms", paragraphs("export", "causes", result), (_causes(result),)),
         Section("Proof", paragraphs("export", "proof", result), _proof(result)),
         Section("Links", paragraphs("export", "links", result), (_links(result),)),
         Section("Validity", paragraphs("export", "validity"), (_validity(result),)),
@@ -128,7 +128,7 @@ def _causes(result: Card) -> Table:
         rows.append((cause.place, cause.carried, cause.how, cost, share))
     unit = " or ".join(dict.fromkeys(result.units))
     error = f"torque error rms [{unit}]"
-    columns = "cause", "carried", "how", error, "of the largest torque [%]"
+    columns = "term", "carried", "how", error, "of the largest torque [%]"
     return Table(columns, tuple(rows), keeps_empty=True)
 
 

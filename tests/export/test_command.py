@@ -71,6 +71,8 @@ def test_the_card_names_every_cause_with_its_cost(tmp_path: Path) -> None:
     assert cost.max() == pytest.approx(0.28, rel=0.1)
     page = (outcome.folder / "report.html").read_text()
     assert all(place in page for place in causes)
+    assert "carries 2 of 6 terms (friction, offsets, effects) exactly" in outcome.report.verdict
+    assert "A cause" not in page
     assert any(check.message.startswith("cogging:2 is lost in urdf; torque error 0.2") for check in outcome.checks)
 
 
@@ -190,7 +192,7 @@ def test_the_mujoco_that_a_file_needs_is_told(cause: str, version: str, tmp_path
     assert ('damping="0.1"' in xml) == (version == "3.3.1")
     assert outcome.json["reader"] == f"MuJoCo {version} or later"
     assert f"The file needs MuJoCo {version} or later." in outcome.report.verdict
-    assert f"The file needs MuJoCo {version} or later;" in (outcome.folder / "report.html").read_text()
+    assert f"The file needs MuJoCo {version} or later. Exported where" in (outcome.folder / "report.html").read_text()
 
 
 def test_a_folder_without_a_model_says_what_is_wanted(tmp_path: Path) -> None:
@@ -248,7 +250,7 @@ def test_a_lost_cause_says_its_unit_and_where_else_it_goes(tmp_path: Path) -> No
     outcome = export(tmp_path, Settings(str(model), "c"))
     (check,) = [check for check in outcome.checks if check.message.startswith("backlash:2")]
     assert check.message.endswith("inverse dynamics of this motion does not show it")
-    assert check.remedy == "export to json, which holds every cause"
+    assert check.remedy == "export to json, which holds every term"
     cause = Cause("coulomb:1", "lost", cost=np.array([2.0, 0.0, 0.0]))
     slides = replace(outcome.result, causes=(cause,), units=("N", "N m", "N m"))
     assert STAGE.checks(slides)[0].message == "coulomb:1 is lost in c; torque error 2 N rms"
