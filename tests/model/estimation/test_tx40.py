@@ -70,7 +70,7 @@ def independent(tx40: ExperimentLog, published: Fitted, shared: Path) -> Indepen
     table[:, joints, 72 + joints] = 1.0
     sos = butter(4, CUTOFF, fs=5000.0, output="sos")
     equations = equations_of(((tx40, found),), published.recipe, published.estimate.columns)[0]
-    at = np.searchsorted(motion.t, equations.times())
+    at = equations.moments()
     A, y = (sosfiltfilt(sos, x, axis=0)[at] for x in (table, tx40.tau))
     slow = np.abs(motion.dq[at]) < SLOW
     return Independent(np.where(slow[:, :, None], 0.0, A), np.where(slow, 0.0, y))
