@@ -73,9 +73,9 @@ def _closes(found: Findings) -> bool:
 
 def _evidence(subject: Subject) -> Evidence | tuple[NotTested, ...]:
     """Return the torque rows of a log; or why there are none."""
-    log, good = subject.log, subject.good
-    if not subject.sampled or not good.time.known:
+    if not subject.sampled or not subject.good.time.known:  # a plan has no positions
         return ()
+    log, good = subject.log, subject.good
     reason, body = "", rigid_body(log.robot)
     numbers = len(body.parameters) + 4
     if log.experiment not in ("excitation", "free", "writing"):
