@@ -168,11 +168,11 @@ def test_a_slide_counts_by_its_own_travel_beside_a_joint_that_turns() -> None:
         body = SimpleNamespace(tip=lambda q: q)
         for when, error in off.items():
             arm: Any = SimpleNamespace(n_joints=2, robot=SimpleNamespace(revolute=revolute), body=body)
-            found[revolute, when] = gains._errors(arm, [(log, Any)], [(measured + error, measured, 5e-3)], True)
+            found[revolute, when] = gains._error(arm, [(log, Any)], [(measured + error, measured, 5e-3)], True)
     held = measured * np.array([1e-5, 1.0])  # a slide that is held is 20 um off, then 40: nobody asks it
     for when, error in (("held before", np.array([2e-5, 0.025])), ("held after", np.array([4e-5, 0.020]))):
         arm = SimpleNamespace(n_joints=2, robot=SimpleNamespace(revolute=(False, True)), body=SimpleNamespace(tip=lambda q: q))
-        found[False, when] = gains._errors(arm, [(log, Any)], [(held + error, held, 5e-3)], True)
+        found[False, when] = gains._error(arm, [(log, Any)], [(held + error, held, 5e-3)], True)
     assert gains.nearer(found[False, "held before"], found[False, "held after"])
     slides, turns = (gains.nearer(found[kind, "before"], found[kind, "after"]) for kind in ((False, True), (True, True)))
     assert slides
