@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from pipelines.diagnosis.result import Extension
     from pipelines.errors import Check
     from pipelines.estimate_bps import Result as Estimate
-    from pipelines.export_model import Result as Exported
+    from pipelines.export.card import Card
     from pipelines.fit_friction import Result as Friction
     from pipelines.frf import Result as Responses
     from pipelines.inspect import Result as Examination
@@ -291,7 +291,7 @@ def design(robot: str | Path | None = None, **options: Any) -> Answer[Design]:
     return Answer(answered(STAGE, request, settings, read(request, settings), {}, started))
 
 
-def export(model: str | Path, to: str) -> Answer[Exported]:
+def export(model: str | Path, to: str) -> Answer[Card]:
     """Bring a model into the format of another program, with a proof of what it carries.
 
     Args:
