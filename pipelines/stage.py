@@ -247,7 +247,7 @@ def usable_folder(
 
 @dataclass(frozen=True, eq=False)
 class Answer(Generic[S, R]):
-    """What a stage found in its inputs: all that was computed, and nothing written."""
+    """Computed result of a stage, with its inputs; `write` writes it."""
 
     stage: Stage[S, R]
     request: Request

@@ -64,7 +64,7 @@ __all__ = [
 
 R = TypeVar("R")
 
-# Where a result has its rows: what `to_frame` gives.
+# The field of each result that `to_frame` makes a table of.
 _ROWS = {
     "inspect": "logs",
     "fit-friction": "joints",
@@ -82,7 +82,7 @@ _ROLES = {"identify", "validate", "reference"}
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Answer(Generic[R]):
-    """What a stage found in some logs; nothing is written before `save`."""
+    """Result of a stage, with its inputs and its report; `save` writes it."""
 
     found: Found[Any, R]
 
@@ -103,7 +103,7 @@ class Answer(Generic[R]):
 
     @property
     def checks(self) -> tuple[Check, ...]:
-        """What was found or repaired in the inputs, each with its code and a remedy."""
+        """Findings and repairs in the inputs, each with its code and a remedy."""
         return self.found.checks
 
     @property

@@ -119,8 +119,8 @@ def in_loops(arms: Sequence[Arm], motions: Motions,
              seconds: float) -> list[list[Positions] | None]:
     """Return the positions of each arm in each log, over its first `seconds`.
 
-    None of one that runs away, or is none that can be simulated. What step suffices for a log
-    suffices for the next: they have one controller and arm.
+    The entry of an arm that runs away, or that cannot be simulated, is None. The step that suffices
+    for one log is used for all: they have one controller and arm.
 
     Raises:
         InputRejected: a log does not describe its controller.

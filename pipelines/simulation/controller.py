@@ -114,7 +114,7 @@ class Feedback:
 
 
 def _counter(step: Any, m: Functions) -> Callable[[Any], Any] | None:
-    """Return what counts in steps; None where there are none."""
+    """Return the function that counts in steps; None for an encoder without steps."""
     if not np.any(step):
         return None
     fine = m.where(step > 0.0, step, 1e-15)  # numerics: a joint without steps beside others
@@ -134,7 +134,7 @@ class Controlling:
         self._ahead = _model_ahead(experiment)
 
     def counted(self, q: Array) -> Array:
-        """Return what the encoders say of q."""
+        """Return the positions (…, joints) that the encoders count at q."""
         counts = self._feedback.counts
         return q if counts is None else np.asarray(counts(q))
 
