@@ -9,6 +9,10 @@ from typing import Any
 
 import pytest
 
+from tests.rows.commanded import command
+
+__all__ = ["command"]
+
 _REPO = Path(__file__).resolve().parents[1]
 
 

@@ -11,12 +11,11 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, RrridError, UsageError
+from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, RrridError
 from pipelines.import_log import STAGE, Result, Settings, compute
 from pipelines.io.files import open_log
-from pipelines.stage import Request, run_stage
 from tests.importers.good import RECIPE, codes, good, lines, run, strict_checker, text, write
-from tests.repairs import REPAIRS, Repair, clock_set_back, lossy, rows_changed, split_files, spoiled
+from tests.repairs import REPAIRS, Repair, clock_set_back, lossy, rows_changed, spoiled
 
 
 @pytest.fixture(scope="module")
@@ -58,12 +57,6 @@ def test_t04_a_part_without_a_whole_period_has_none(folder: Path) -> None:
     first, second = run(folder, repair.recipe).result.logs
     assert (first.log.period, second.log.period) == (None, 0.5)
     assert "period left out: 0.4 s < 0.5 s period" in first.altered
-
-
-@pytest.mark.parametrize("entry", ["q_0=q_1", "q_4=q_1", "q_9=q_1", "tau_17=tau_1", "t_2=t", "t_1=t"])
-def test_c02_a_map_for_a_joint_that_is_not_there(folder: Path, entry: str) -> None:
-    with pytest.raises(UsageError, match="RRID-C02 --map"):
-        run(folder, map=(entry,))
 
 
 def unit_away(recipe: str) -> str:
@@ -162,11 +155,6 @@ def test_f15_a_file_that_is_still_written(folder: Path) -> None:
             run(folder)
 
 
-def test_a_companion_is_no_log_of_its_own(folder: Path) -> None:
-    recipe = split_files(folder).replace('"{run}_pos.csv"\nname = "{run}"', '"*.csv"').replace("{run}_tau", "a_tau")
-    assert [i.name for i in run(folder, recipe).result.logs] == ["a_pos"]
-
-
 def test_d07_angles_that_wrap_are_unwrapped_without_being_asked(folder: Path) -> None:
     """D07: joint 1 turns through ±pi; its wrapped angle comes back as the motion it was, but for whole turns."""
     columns = good()
@@ -219,15 +207,3 @@ def test_f14_a_file_that_changes_meanwhile(folder: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr("tests.importers.good.STAGE", dataclasses.replace(STAGE, compute=meddle))
     with pytest.raises(InputRejected, match="RRID-F14"):
         run(folder)
-
-
-def test_a_recipe_that_is_not_there() -> None:
-    with pytest.raises(UsageError, match="RRID-C04.*did you mean 'tx40'"):
-        run_stage(STAGE, Request(()), Settings(recipe="tx4"))
-
-
-def test_nothing_matched_names_the_patterns(folder: Path) -> None:
-    with pytest.raises(NothingMatched, match=r"RRID-C06.*run_\{n\}.csv"):
-        run(folder, RECIPE.replace('"*.csv"', '"run_{n}.csv"'))
-
-

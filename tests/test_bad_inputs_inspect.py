@@ -5,19 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import h5py
-import numpy as np
 import pytest
 
-from pipelines import inspect
-from pipelines.errors import Check
 from pipelines.io.files import write_log
-from pipelines.report.codes import first_to_read
-from pipelines.stage import Request, run_stage
 from tests.fault_table import FAULTS, Fault
-from tests.healthy import good_log, with_signal
-from tests.rows.commanded import Command, command
-
-__all__ = ["command"]
+from tests.healthy import good_log
+from tests.rows.commanded import Command
 
 _FIRST = {fault.code: fault for fault in reversed(FAULTS)}  # of every row the first case
 
@@ -86,18 +79,6 @@ def test_the_repair_that_is_named_is_one(signal: str, unit: str, tmp_path: Path,
     done = command("inspect", "log.h5", "--no-report", "--out", "out")
     assert done.exit == 0
     assert {c["code"] for c in done.object["checks"] if c["level"] != "ok"} == {"RRID-F05", "RRID-S06"}
-
-
-def test_a_late_torque_is_told_before_a_missing_digest(tmp_path: Path, command: Command) -> None:
-    """T06, F05: what spoils an identification comes first, in the verdict and in the list."""
-    write_log(tmp_path / "log.h5", with_signal(good_log(), tau=np.roll(good_log().tau, 40, axis=0)))
-    with h5py.File(tmp_path / "log.h5", "r+") as file:
-        del file.attrs["digest"]
-    checks = [Check(**c) for c in command("inspect", "log.h5", "--no-report", "--out", "out").object["checks"]]
-    found = sorted((c for c in checks if c.level != "ok"), key=first_to_read)
-    assert [found[0].code, found[-1].code] == ["RRID-T06", "RRID-F05"]
-    done = run_stage(inspect.STAGE, Request((tmp_path / "log.h5",), tmp_path / "out", no_report=True), inspect.Settings())
-    assert "First of all: torque lies" in done.report.verdict
 
 
 def test_trusted_units_are_not_doubted(tmp_path: Path, command: Command) -> None:

@@ -95,14 +95,6 @@ def test_findings_that_come_or_go(tmp_path: Path) -> None:
     assert outcome.exit_code == 1
 
 
-def test_an_extension_names_what_stands(tmp_path: Path) -> None:
-    """`extend` writes "stribeck:1" where `diagnose` writes an object: both are told alike."""
-    a, b = (written(tmp_path / name, 1, findings=[], baseline_effects=standing)
-            for name, standing in (("a", ["stribeck:1"]), ("b", [{"cause": "stribeck", "joint": 1}])))
-    answers = {one.what: (one.a, one.b, one.differs) for one in go(tmp_path, a, b).result.answers}
-    assert answers["baseline_effects"] == ("stribeck:1", "stribeck:1", False)
-
-
 def test_models_are_compared(tmp_path: Path, samples: Path) -> None:
     """Two model files: the shipped one with itself, then with one base parameter moved by 50 std."""
     model = json.loads((samples / "models/rrr.json").read_text())
@@ -145,71 +137,6 @@ def test_a_phase_moves_the_shorter_way_around(tmp_path: Path) -> None:
     away = {one.name: (round(one.away, 1), one.period) for one in go(tmp_path, a, b).result.figures}
     assert away["model cogging joint 2 phase 2"] == (6.2, 2.0 * math.pi)
     assert away["model spring joint 2 rest angle"] == (-36.6, None)
-
-
-def test_every_figure_counts_once(tmp_path: Path) -> None:
-    """What a finding says again of the model, and orders of harmonics that follow from the first, are no figures of their own: the
-    limit is that of the others. A finding that no model has in both results counts as it stands; of a run too."""
-    wave = dict.fromkeys(("order", "order_2", "order_3", "amplitude", "phase"), (1.0, 0.1))
-    a, b = (extended(tmp_path / name, 1, cogging=wave) for name in "ab")
-    result = go(tmp_path, a, b).result
-    own = {f"cogging joint 2 {name}" for name in ("amplitude", "order", "phase")}
-    assert {one.name for one in result.figures} == {"model coulomb joint 1 level", *(f"model {name}" for name in own)}
-    assert result.limit == limit_of(4)
-    alone = json.loads((b / "result.json").read_text()) | {"model": None}
-    c, d = (written(tmp_path / name, 1, **alone) for name in "cd")
-    assert {one.name for one in go(tmp_path, c, d).result.figures} == own
-    steps = [{"name": name, "exit": 0, "result": json.loads((b / "result.json").read_text()) | more}
-             for name, more in (("diagnose", {"model": None}), ("extend", {}))]
-    e, f = (written(tmp_path / name, 1, command="run", stages=steps, findings=steps[0]["result"]["findings"]) for name in "ef")
-    assert {one.name for one in go(tmp_path, e, f).result.figures} == {f"extend {one.name}" for one in result.figures}
-
-
-def test_both_errors_of_an_extension_are_shown(tmp_path: Path) -> None:
-    """What the nominal model leaves, and what the extended one leaves."""
-    outcome = go(tmp_path, extended(tmp_path / "a", 1), extended(tmp_path / "b", 2))
-    shown = {one.name: (one.a, one.b) for one in outcome.result.residuals}
-    assert shown["nominal model residual rms validate joint 1"] == (0.3, 0.6)
-    assert shown["extended model residual rms validate joint 1"] == (0.1, 0.2)
-
-
-def test_an_effect_that_only_one_has_comes_first(tmp_path: Path) -> None:
-    """Models, whether their numbers have a std or not: the verdict says which has what; so do two extensions, and say it once."""
-    ripple, files = {"amplitude": (0.3, 0.01)}, []
-    for name, effects in (("a", {}), ("b", {"cogging": ripple, "torque_offset": {"offset": (0.1, 0.01)}})):
-        (tmp_path / name).mkdir()
-        files.append(tmp_path / name / "model.json")
-        files[-1].write_text(json.dumps(model(**effects)))
-    outcome = go(tmp_path, *files)
-    has = "cogging at joint 2, and torque offset at joint 2"
-    assert outcome.report.verdict == f"a/model.json and b/model.json differ. b/model.json has {has}, which a/model.json has not."
-    assert (outcome.result.effects_a, outcome.result.effects_b) == ((), ("cogging:2", "torque_offset:2"))
-    assert (outcome.exit_code, outcome.report.sections[0].title) == (1, "Laws and effects that only one has")
-    for file in files:
-        file.write_text(file.read_text().replace('"std": 0.01', '"std": null').replace('"std": 0.1', '"std": null'))
-    assert has in go(tmp_path, *files).report.verdict
-    found = go(tmp_path, extended(tmp_path / "c", 1), extended(tmp_path / "d", 1, cogging=ripple))
-    assert found.report.verdict == "c and d differ. d has cogging at joint 2, which c has not."
-
-
-def test_friction_that_was_given_is_no_law_less(tmp_path: Path) -> None:
-    """An estimate that took its friction from elsewhere has none among its parameters: nothing is said of that."""
-    level = {"name": "coulomb:1:level", "value": 1.0, "std": 0.1, "unit": "N m", "visible": True}
-    a, b = written(tmp_path / "a", 1), written(tmp_path / "b", 2)
-    told = json.loads((b / "result.json").read_text())
-    b = written(tmp_path / "b", 2, parameters=[*told["parameters"], level])
-    assert "agree" in go(tmp_path, a, b).report.verdict
-
-
-def test_one_result_twice_is_said_to_be_one(tmp_path: Path) -> None:
-    """By its folder, by a copy of it, and where it has nothing that could be compared."""
-    a, b = written(tmp_path / "monday", 1), written(tmp_path / "copy", 1)
-    for one, other, words in ((a, a, "monday (A) and monday (B)"), (a, b, "monday and copy")):
-        outcome = go(tmp_path, one, other)
-        assert outcome.report.verdict.startswith(f"{words} are the same result")
-        assert (outcome.result.same, outcome.exit_code) == (True, 0)
-    bare = bad(tmp_path / "bare", '{"command": "inspect", "schema_version": 2}')
-    assert "the same result" in go(tmp_path, bare, bare).report.verdict
 
 
 def bad(folder: Path, text: str) -> Path:

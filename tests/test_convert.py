@@ -48,15 +48,6 @@ def test_two_logs_of_one_name_both_survive(tmp_path: Path) -> None:
     assert sorted(path.name for path in (out / "logs").iterdir()) == ["a-2.parquet", "a.parquet"]
 
 
-def test_the_content_decides_and_not_the_name(tmp_path: Path) -> None:
-    """Parquet under the name of HDF5 becomes HDF5, for it is Parquet."""
-    write_log(tmp_path / "in/a.parquet", small_log())
-    (tmp_path / "in/a.parquet").rename(tmp_path / "in/a.h5")
-    out = _convert(tmp_path / "in", tmp_path / "out")
-    assert [path.name for path in (out / "logs").iterdir()] == ["a.h5"]
-    assert (out / "logs/a.h5").read_bytes()[1:4] == b"HDF"
-
-
 def test_a_cell_is_no_formula() -> None:
     """X10: text that a spreadsheet would run is quoted; plain text stays plain."""
     assert csv_cell("=cmd|' /C calc'!A0").startswith("\"'=")

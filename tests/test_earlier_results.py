@@ -14,7 +14,6 @@ from pipelines.errors import UsageError
 from pipelines.io.files import write_log
 from pipelines.report.report import Report
 from pipelines.stage import Outcome, Request, Stage, read_logs, run_stage
-from tests.cli.commands import rrrid
 from tests.io.logs import small_log
 
 
@@ -56,15 +55,6 @@ def test_a_result_of_another_command_is_refused(days: Path) -> None:
     assert [path.name for path in days.glob("out*")] == ["out"]
 
 
-@pytest.mark.row("C05")
-def test_a_default_folder_has_the_newest_result(days: Path) -> None:
-    """Two folders of one name: the later result replaces the earlier one, as a whole, and nothing is moved aside."""
-    place = _converted("monday").folder
-    assert _converted("tuesday").folder == place
-    assert [path.name for path in (place / "logs").iterdir()] == ["b.parquet"]
-    assert [path.name for path in place.parent.iterdir()] == ["convert"]
-
-
 @dataclass(frozen=True)
 class _Nothing:
     pass
@@ -84,13 +74,3 @@ def test_a_stage_within_a_run_is_no_output_of_that_command(days: Path) -> None:
     with pytest.raises(UsageError, match=r"RRID-C05 all/inspect: .*result\.json"):
         _inspected("monday", out=Path("all/inspect"), force=True)
     assert _contents(Path("all")) == before
-
-
-@pytest.mark.row("C05")
-def test_the_terminal_says_what_to_do(days: Path) -> None:
-    """Exit 2, with both ways out of it."""
-    assert rrrid("convert", "monday/logs", "--out", "out", "--no-report", cwd=days).returncode == 0
-    done = rrrid("inspect", "monday/logs", "--out", "out", "--no-report", cwd=days)
-    assert done.returncode == 2
-    assert "holds the earlier result of convert" in done.stderr
-    assert "--force" in done.stderr

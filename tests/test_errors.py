@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pipelines.errors import InputRejected, clean, did_you_mean
+from pipelines.errors import InputRejected, clean
 
 
 def test_an_error_is_one_printable_line() -> None:
@@ -12,15 +12,6 @@ def test_an_error_is_one_printable_line() -> None:
     problem = InputRejected("F01", "a\nb\x1b[31m", where="x\ty", remedy="do it")
     assert str(problem) == "RRID-F01 x y: a b[31m. Do it."
     assert len(clean("x" * 10_000)) == 400
-
-
-@pytest.mark.parametrize(("word", "most", "said"), [
-    ("--twins", 1, ""),  # only the dashes, which every option has, make it like --joints
-    ("--quiet", 1, ""), ("--modle", 1, ", did you mean '--model'?"), ("-models", 1, ", did you mean '--model'?"),
-    ("--mosel", 2, ", did you mean '--model' or '--most'?"), ("--mode", 1, ", did you mean '--model'?"),
-])
-def test_only_what_is_near_is_suggested(word: str, most: int, said: str) -> None:
-    assert did_you_mean(word, ("--joints", "--model", "--most", "--out"), most) == said
 
 
 @pytest.mark.parametrize(("message", "remedy", "said"), [
@@ -34,9 +25,3 @@ def test_only_what_is_near_is_suggested(word: str, most: int, said: str) -> None
 def test_one_mark_ends_a_sentence_and_names_stay_as_they_are(message: str, remedy: str, said: str) -> None:
     """No full stop behind a question mark; what is typed (options, values, keys) gets no capital."""
     assert str(InputRejected("F01", message, remedy=remedy)) == f"RRID-F01 {said}"
-
-
-def test_a_long_text_ends_behind_a_word() -> None:
-    """What is left out follows the last whole word; of one endless word a part is better than nothing."""
-    assert clean("the drive of panda_joint3 saturates", 30) == "the drive of panda_joint3 …"
-    assert clean("x" * 50, 30) == "x" * 29 + "…"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 
@@ -33,14 +32,3 @@ def test_a_scara_arm_is_imported_in_metres_where_it_slides(units: dict[str, str]
         assert log.robot.revolute == (True, True, False, True)
         assert np.allclose(log.q, table[:, 1:5], rtol=0.0, atol=1e-12)
         assert np.allclose(log.tau, table[:, 5:9], rtol=0.0, atol=1e-9)
-
-
-def test_alphabetical_columns_are_put_in_the_order_of_the_robot(shared: Path, tmp_path: Path) -> None:
-    """Case 08: the elbow comes first in the file; the draft of a recipe has the six joints as the URDF does."""
-    shutil.copytree(shared / "cases/08-alphabetical-joints", tmp_path, dirs_exist_ok=True)
-    drafted = rrrid("import", "--guess", "run.csv", cwd=tmp_path)
-    assert drafted.returncode == 0, drafted.stderr
-    joints = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
-    for signal in ("position", "effort"):
-        columns = json.dumps([f"{name}_joint_{signal}" for name in joints])
-        assert f"columns = {columns}" in drafted.stdout

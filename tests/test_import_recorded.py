@@ -6,13 +6,12 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 
 from pipelines.import_log import STAGE, Result, Settings
 from pipelines.io.files import open_log
 from pipelines.stage import Outcome, Request, run_stage
-from tests.importers.good import codes, strict_checker
+from tests.importers.good import strict_checker
 
 
 @pytest.fixture(scope="module")
@@ -80,37 +79,3 @@ def test_odrive_runs_have_their_roles_and_an_even_grid(odrive: Outcome[Result]) 
     assert np.allclose(log.tau, 0.0551 * log["current"])
     assert log.derived is not None
     assert "resampled from 14732 samples 1.449 to 6.057 ms apart (median 2.269 ms) to 13333 at 400 Hz" in log.derived.settings
-
-
-def test_odrive_turns_as_it_was_told(odrive: Outcome[Result], shared: Path) -> None:
-    """0.1 revolutions a second for ten seconds; and no resampled position strays from the recorded ones."""
-    log = open_log(odrive.folder / "logs" / "nocomp_0.h5").log
-    assert np.polyfit(log.t, log.q[:, 0], 1)[0] / (2 * np.pi) == pytest.approx(0.1, rel=0.02)
-    recorded = np.loadtxt(shared / "real" / "odrive" / "slow2_nocomp_0.csv", delimiter=",", skiprows=1)
-    straight = np.interp(log.t, recorded[:, 0], recorded[:, 1]) * 2 * np.pi / 8192
-    assert np.abs(log.q[:, 0] - straight).max() < 1.5 * 2 * np.pi / 8192
-
-
-def test_odrive_maps_become_tables_with_units(odrive: Outcome[Result]) -> None:
-    table = pq.read_table(odrive.folder / "tables" / "holding_current_forward.parquet")
-    assert table.num_rows == 2048
-    assert [table.schema.field(c).metadata[b"units"] for c in ("position", "current")] == [b"rad", b"A"]
-    assert table.column("position")[1].as_py() == pytest.approx(4 * 2 * np.pi / 8192)
-
-
-def test_only_the_resampling_is_said_of_the_uneven_set(tx40: Outcome[Result], odrive: Outcome[Result]) -> None:
-    """Intervals that come late and are resampled across are no lost samples."""
-    assert codes(tx40) == {}
-    assert codes(odrive) == {"T05": "warn", "T04": "ok"}  # T04: the way back that the recipe leaves out
-    assert any("intervals of more than 1.5 times the median bridged" in check.message for check in odrive.checks)
-
-
-def test_the_way_back_over_a_whole_turn_is_left_out(odrive: Outcome[Result]) -> None:
-    """Three runs begin with it, at up to 12 rev/s; what is left turns as slowly as it was told to, give or take its ripple."""
-    for name in ("nocomp_1", "nocomp_2", "slower_comp_0"):
-        log = open_log(odrive.folder / "logs" / f"{name}.h5").log
-        assert log.t[0] >= 0.5
-        assert np.abs(np.gradient(log.q[:, 0], log.t)).max() < 10.0
-    said = [check.message for check in odrive.checks if check.code == "RRID-T04"]
-    assert len(said) == 3
-    assert all("the first 0.5 s" in message for message in said)

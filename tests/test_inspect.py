@@ -6,20 +6,16 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
-from pipelines import import_log, inspect, reconstruct
+from pipelines import import_log, inspect
 from pipelines.errors import InputRejected
 from pipelines.io.files import find_logs, open_log, write_log
-from pipelines.io.hdf5 import read_series
 from pipelines.io.log import ExperimentLog
-from pipelines.io.results import decode
 from pipelines.stage import Outcome, Request, run_stage
 from tests.fault_table import FAULTS
-from tests.faulty import faster, good_path
-from tests.healthy import good_log, make_log, rest, rows, with_signal
+from tests.healthy import good_log, make_log, rest, with_signal
 from tests.seeds import rarely
 
 MAKE = {fault.row: fault.make for fault in FAULTS}
@@ -88,15 +84,6 @@ def test_the_result_holds_what_the_contract_says(tmp_path: Path) -> None:
     assert outcome.exit_code == 0
 
 
-def test_a_stored_result_is_drawn_again(tmp_path: Path) -> None:
-    outcome = doctor(tmp_path, MAKE["T04"](good_log()), good_log(1))
-    stored = json.loads((tmp_path / "out" / "result.json").read_text())
-    result = decode(inspect.Result, stored, read_series(tmp_path / "out" / "result.h5"))
-    again = inspect.report(result)
-    assert again.verdict == outcome.report.verdict
-    assert [s.title for s in again.sections] == [s.title for s in outcome.report.sections]
-
-
 def test_equal_logs_give_equal_results(tmp_path: Path) -> None:
     texts = []
     for name in ("a", "b"):
@@ -118,20 +105,6 @@ def test_the_report_of_a_broken_log_is_drawn(row: str, tmp_path: Path) -> None:
     assert "<script" not in page
     assert len(page) < 200_000
     assert outcome.report.tone in ("bad", "attention")
-
-
-@pytest.mark.parametrize("every", [12, pytest.param(1, marks=pytest.mark.slow)])
-def test_every_fault_has_a_report(every: int) -> None:
-    """Words and tables for each; nothing is drawn here."""
-    from pipelines.io.files import Opened
-    from pipelines.stage import Inputs
-
-    for fault in FAULTS[::every]:
-        opened = Opened(Path("log.h5"), "0" * 64, fault.make(good_log()), ())
-        result = inspect.compute(Inputs((opened,)), inspect.Settings())
-        report = inspect.report(result)
-        assert report.verdict.startswith("The log "), fault.row
-        assert "Findings" in [section.title for section in report.sections[:2]]  # behind what the torque is
 
 
 def test_another_robot_must_have_as_many_joints(tmp_path: Path) -> None:
@@ -221,40 +194,12 @@ def test_signals_of_the_preview_cover_the_log() -> None:
     np.testing.assert_array_equal(preview.tau.min(axis=0), log.tau.min(axis=0))
 
 
-def test_a_preview_is_broken_at_every_gap() -> None:
-    """A hole of 30 samples, less than a bucket: no bucket holds both its sides, and a blank stands between them."""
-    from pipelines.quality.checks import Subject
-    from pipelines.report.log_preview import log_preview
-
-    log = make_log(lambda t: (np.outer(t, np.ones(3)), np.ones((t.size, 3)), np.zeros((t.size, 3))), duration=20.0)
-    log = rows(log, np.r_[0:9000, 9030:log.n_samples])
-    preview = log_preview(Subject(log))
-    (blank,) = np.flatnonzero(np.isnan(preview.q).all(axis=1))
-    assert log.t[8999] < preview.t[blank] < log.t[9000]
-    assert (np.diff(preview.t) >= 0).all()
-    assert np.nanmax(preview.q[:blank, 0]) <= log.q[:9000, 0].max()
-    assert preview.intervals.size == preview.n_intervals == log.n_samples - 1
-
-
 def test_several_robots_are_named(tmp_path: Path) -> None:
     """Logs of two robots are not "all logs": the verdict counts the robots, and the table names them."""
     outcome = doctor(tmp_path, good_log(), replace(good_log(1), robot_name="another"))
     assert "2 logs of 2 robots are in order" in outcome.report.verdict
     (logs,) = next(s for s in outcome.report.sections if s.title == "The logs").tables
     assert [row[logs.columns.index("robot")] for row in logs.rows] == ["rrr-tue", "another"]
-
-
-def test_what_cannot_be_judged_has_not_passed(tmp_path: Path) -> None:
-    """A hold log without an encoder step: neither its columns nor its torque nor its resolution were tested."""
-    log = make_log(rest, "hold", duration=2.0)
-    log = with_signal(log, q=log.q + 1e-3 * np.random.default_rng(0).standard_normal(log.q.shape))
-    outcome = doctor(tmp_path, log)
-    untested = {item["code"] for item in outcome.json["not_tested"]}
-    assert untested >= {"RRID-S13", "RRID-S14", "RRID-S15", "RRID-T06", "RRID-D08"}
-    assert untested.isdisjoint(check["code"] for check in outcome.json["checks"])
-    assert all(item["where"] and item["reason"] for item in outcome.json["not_tested"])
-    assert "Not tested, and why" in [section.title for section in outcome.report.sections]
-    assert "could not be made" in outcome.report.verdict
 
 
 def test_a_channel_used_twice_is_seen(tmp_path: Path) -> None:
@@ -266,48 +211,3 @@ def test_a_channel_used_twice_is_seen(tmp_path: Path) -> None:
     assert "tau of joint 1 and tau of joint 2" in twice.message
     assert not [c for c in outcome.result.checks if c.code == "RRID-S13" and c.level == "ok"]
     assert outcome.exit_code == 1
-
-
-def test_the_verdict_and_the_first_row_agree(tmp_path: Path) -> None:
-    """Columns in the wrong place come before what follows from them."""
-    outcome = doctor(tmp_path, MAKE["S13 tau"](make_log(faster(3.0))))
-    table = outcome.report.sections[0].tables[0]
-    assert str(table.rows[0][1]) in outcome.report.verdict
-
-
-def test_a_log_that_cannot_be_opened_has_no_empty_tables(tmp_path: Path) -> None:
-    write_log(tmp_path / "cut.h5", good_log())
-    (tmp_path / "cut.h5").write_bytes((tmp_path / "cut.h5").read_bytes()[:5000])
-    request = Request((tmp_path / "cut.h5",), out=tmp_path / "out", no_report=True)
-    outcome = run_stage(inspect.STAGE, request, inspect.Settings())
-    assert all(table.rows for section in outcome.report.sections for table in section.tables)
-    assert outcome.report.verdict.startswith("The log cannot be used.")
-
-
-@pytest.mark.parametrize("experiment", ["hold", "excitation"])
-def test_angles_of_every_kind_of_log_are_told_in_radians(experiment: str, tmp_path: Path) -> None:
-    """Also where the file has them in degrees, and the joints are held: one unit throughout the report."""
-    log = good_log()
-    bare = replace(log, experiment=experiment, name=experiment)
-    write_log(tmp_path / "logs/log.h5", bare)
-    with h5py.File(tmp_path / "logs/log.h5", "a") as file:
-        file.attrs.pop("digest", None)
-        for name in [name for name in ("q", "q_ref") if name in file["signals"]]:
-            signal = file["signals"][name]
-            signal[...] = np.rad2deg(signal[...])
-            signal.attrs["units"] = "deg"
-    found = run_stage(inspect.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out", no_report=True), inspect.Settings())
-    section = next(one for one in found.report.sections if one.title.startswith("Log "))
-    rows = {row[0]: row for row in section.tables[0].rows if row[1] == 1}
-    assert rows["q"][-1] == "rad"
-    assert rows["q"][2] == pytest.approx(float(np.nanmin(log.q[:, 0])), rel=1e-3)
-
-
-def test_inspect_says_of_periods_what_the_stages_say(tmp_path: Path) -> None:
-    """T10: the attribute period is 4 s where the motion repeats after 5: the doctor warns of it in the words of `reconstruct`."""
-    write_log(tmp_path / "a.h5", make_log(good_path(), duration=15.0, period=4.0))
-    told = [[(check.message, check.level) for check in run_stage(stage, Request((tmp_path / "a.h5",), tmp_path / stage.name,
-                                                                                no_report=True), stage.settings()).checks
-             if check.code == "RRID-T10"] for stage in (inspect.STAGE, reconstruct.STAGE)]
-    assert told[0] == told[1]
-    assert [level for _, level in told[0]] == ["warn"]

@@ -23,7 +23,7 @@ from pipelines.stage import Outcome, Request, run_stage
 from tests.cli.commands import rrrid
 from tests.fault_table import FAULTS
 from tests.faulty import good_path
-from tests.healthy import AMPLIFIER, ENCODER, good_log, make_log, rest, rows, with_signal
+from tests.healthy import AMPLIFIER, ENCODER, good_log, make_log, rest, rows
 
 Settings = reconstruct.Settings
 
@@ -161,38 +161,6 @@ def test_innovations_are_judged(tmp_path: Path) -> None:
     assert np.isnan(still.innovation_whiteness).all()
 
 
-def test_the_table_shows_what_the_innovations_are_judged_by(tmp_path: Path) -> None:
-    """Nearly white: a correlation below 0.2 in the headline and of each joint in the table, where 0 is white."""
-    log = open_log(Path(__file__).resolve().parents[1] / "sample_logs/rrr-changed/excitation-3.h5").log
-    done = stage(tmp_path, log)
-    found = done.result.logs[0].innovation_correlation
-    assert f"nearly white, their correlation {found.max():.2f} at most: below 0.2 these deviations hold" in done.report.verdict
-    (table,) = (table for section in done.report.sections for table in section.tables if "correlation" in table.columns)
-    assert [row[table.columns.index("correlation")] for row in table.rows] == found.tolist()
-    assert "0 where they are white" in table.caption
-    assert found.max() < 0.2
-
-
-def test_asked_for_deviations_that_mean_nothing_are_doubted(tmp_path: Path) -> None:
-    """Coloured innovations under a jerk level asked for: a warning, words in the report, and no good verdict."""
-    stiff = stage(tmp_path / "a", good_log(), settings=Settings(jerk_std=(0.5,)))
-    assert any(check.level == "warn" and "only where they are white" in check.message for check in stiff.result.checks)
-    assert any("holds only where the innovations are white" in text for section in stiff.report.sections for text in section.text)
-    assert stiff.report.tone == "attention"
-    tuned = stage(tmp_path / "b", good_log())
-    assert tuned.report.tone == "good"
-    assert not any("white" in check.message for check in tuned.result.checks)
-
-
-@pytest.mark.parametrize("method", ["central-differences", "zero-phase"])
-def test_a_method_without_deviations_is_not_called_good(method: str, tmp_path: Path) -> None:
-    """That central differences keep every sample says nothing of the speed they find."""
-    report = stage(tmp_path, good_log(), settings=Settings(method)).report
-    assert report.tone != "good"
-    assert "cannot say" in report.verdict
-    assert "within 0" not in report.verdict
-
-
 def test_far_from_the_encoder_is_an_alarm(tmp_path: Path) -> None:
     """More than 5e-4 rad: attention, and exit 1 with --check; without it, or within it, 0; a slide is not judged by it."""
     result = stage(tmp_path / "a", good_log()).result
@@ -211,44 +179,6 @@ def test_far_from_the_encoder_is_an_alarm(tmp_path: Path) -> None:
     assert any(check.code == "RRID-D12" and check.gate for check in stiff.result.checks)
 
 
-@pytest.mark.parametrize("average", [True, False])
-def test_periods_are_compared(average: bool, tmp_path: Path) -> None:
-    """Three periods are compared, averaged or not; the derived log holds every sample either way."""
-    log = make_log(good_path(), duration=15.0, period=5.0)
-    outcome = stage(tmp_path, log, settings=Settings(average=average))
-    text = " ".join(text for section in outcome.report.sections for text in section.text)
-    assert "3 periods were compared: their scatter is the noise floor" in text
-    found = outcome.result.logs[0]
-    assert ("not averaged, as asked for" in text) == (found.mean is None) == (not average)
-    if found.mean is not None:
-        assert found.mean.periods == 3
-    assert motion_of(open_log(outcome.folder / "logs/log-0.h5").log, Settings(average=not average)).derived
-
-
-def test_a_period_that_is_none_is_said(tmp_path: Path) -> None:
-    """T10: the attribute period is 4 s where the motion repeats after 5."""
-    outcome = stage(tmp_path, make_log(good_path(), duration=15.0, period=4.0))
-    (check,) = [check for check in outcome.result.checks if check.code == "RRID-T10"]
-    assert "differs from one period to the next" in check.message
-    assert outcome.result.logs[0].mean is None
-
-
-@pytest.mark.parametrize("resolution", [2e-3, 5e-3])
-def test_a_coarse_encoder_is_no_alarm(resolution: float, tmp_path: Path) -> None:
-    """An encoder of 2 mrad is up to 1 mrad from the motion, which is no fault of the reconstruction; beyond a step it is one."""
-    log = good_log()
-    coarse = with_signal(log, q=resolution * np.rint(good_path()(log.t)[0] / resolution))
-    outcome = stage(tmp_path, coarse)
-    found = outcome.result.logs[0]
-    assert (found.reconstruction_error_max > 5e-4).any()
-    assert reconstruct.exit_code(outcome.result, True) == 0
-    assert not any(check.code == "RRID-D12" for check in outcome.result.checks)
-    far = replace(found, reconstruction_error_max=np.array([1.1 * resolution, 1e-5, 1e-5]))
-    assert reconstruct.exit_code(replace(outcome.result, logs=(far,)), True) == 1
-    verdict = reconstruct.report(replace(outcome.result, logs=(far,))).verdict
-    assert "its steps allow for" in verdict
-
-
 def test_plans_have_no_motion(tmp_path: Path) -> None:
     """A planned trajectory beside logs is passed over and named; alone it is nothing to reconstruct."""
     log = good_log()
@@ -258,17 +188,6 @@ def test_plans_have_no_motion(tmp_path: Path) -> None:
     assert any("plan" in check.message for check in outcome.result.checks)
     with pytest.raises(NothingMatched):
         stage(tmp_path / "b", plan)
-
-
-def test_report_shows_what_the_paper_shows(tmp_path: Path) -> None:
-    """Fig. 7, Fig. 10(a)-(c) and the spectrum; no word of mark-up from a hostile name gets through."""
-    outcome = stage(tmp_path, replace(good_log(), name="<script>$a_{"), report=True)
-    names = [figure.name for section in outcome.report.sections for figure in section.figures]
-    assert [name.split("-")[0] for name in names] == ["bode", "error", "spectrum", "speed", "acceleration"]
-    page = (outcome.folder / "report.html").read_text(encoding="utf-8")
-    assert "<script" not in page
-    assert page.count("<svg") >= 5
-    assert "standard deviation" in outcome.report.verdict
 
 
 @pytest.mark.slow

@@ -14,10 +14,7 @@ from pipelines import estimate_bps, fit_friction, run, validate_writing
 from pipelines.io.files import open_log, write_log
 from pipelines.io.log import Signal
 from pipelines.io.sessions import apart
-from pipelines.report.run_report import stage_lines
-from pipelines.report.sections import CARD
 from pipelines.stage import Outcome, Request, read_logs, run_stage
-from tests.cli.commands import rrrid
 from tests.diagnose.sessions import written
 from tests.healthy import begun
 
@@ -57,35 +54,6 @@ def test_every_stage_is_there_in_the_order_of_the_data(whole: Outcome[run.Result
     assert stages[4]["result"]["model"].startswith("estimate-bps")
 
 
-def test_what_the_logged_torque_is_comes_first(whole: Outcome[run.Result]) -> None:
-    """Of the run, of `inspect` and of `estimate-bps`: the card is the first section, and `boundary` a field of the result."""
-    stored = json.loads((whole.folder / "result.json").read_text())
-    assert whole.report.sections[0].title == CARD
-    assert stored["boundary"]["sign"] == "signed"
-    stages = {stage["name"]: stage["result"] for stage in stored["stages"]}
-    for step in whole.result.stages:
-        if step.name in ("inspect", "estimate-bps"):
-            assert step.report.sections[0].title == CARD
-            assert stages[step.name]["boundary"]["gravity"]["present"]
-
-
-def test_the_ledger_begins_with_no_model(whole: Outcome[run.Result]) -> None:
-    """The torque itself, the rigid body alone, then with friction: each line builds on the one before, and every joint gains."""
-    nothing, rigid, friction = stage_lines(whole.result.stages)
-    assert (nothing.before, rigid.before, friction.before) == (None, nothing.rms, rigid.rms)
-    assert all(f < r < n for n, r, f in zip(nothing.rms, rigid.rms, friction.rms, strict=True))
-    tables = next(section for section in whole.report.sections if section.title.startswith("Error by model stage")).tables
-    assert [row[0] for row in tables[0].rows] == [line.step for line in (nothing, rigid, friction)]
-
-
-def test_what_to_record_is_said(whole: Outcome[run.Result]) -> None:
-    """No frf log is there: the report says what recording would bring it."""
-    lacking = next(section for section in whole.report.sections if section.title == "What these logs lack")
-    (row,) = lacking.tables[0].rows
-    assert row[0] == "frf"
-    assert "let one joint turn" in str(row[2])
-
-
 def test_the_workflow_gives_what_its_stages_give(whole: Outcome[run.Result], logs: Path, tmp_path: Path) -> None:
     """estimate-bps inside `run`, on derived logs, is estimate-bps on the recordings with the friction that fit-friction found."""
     settings = estimate_bps.Settings(model=str(whole.folder / "fit-friction/model.json"))
@@ -94,17 +62,6 @@ def test_the_workflow_gives_what_its_stages_give(whole: Outcome[run.Result], log
     assert inside["parameters"] == alone.json["parameters"]
     assert inside["relative_error"] == alone.json["relative_error"]
     assert (whole.folder / "estimate-bps/model.json").read_bytes() == (alone.folder / "model.json").read_bytes()
-
-
-def test_it_is_said_whose_friction_went_in(whole: Outcome[run.Result], logs: Path, tmp_path: Path) -> None:
-    """In a run that of fit-friction, on its own none, or that of a model; the report says so, and which option makes them equal."""
-    rests = next(section for section in whole.report.sections if section.title == "estimate-bps: What the estimate rests on")
-    assert rests.text[0].startswith("Friction: held, that of fit-friction, earlier in this run.")
-    assert "--model RUN/fit-friction/model.json" in rests.text[0]
-    for words, said in (((), "Friction: Coulomb and viscous, fitted with the rest, for no other was given."),
-                        (("--model", whole.folder / "fit-friction/model.json"), "Friction: held, that of model.json, as --model")):
-        told = rrrid("estimate-bps", logs, *words, "--no-report", "--out", tmp_path / "out", cwd=tmp_path).stdout
-        assert said in told
 
 
 def test_what_a_folder_lacks_is_passed_over_with_a_word(samples: Path, tmp_path: Path) -> None:

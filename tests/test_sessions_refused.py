@@ -51,19 +51,6 @@ def test_every_command_refuses_two_sessions(module: str, other: dict[str, str], 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["logs"]
 
 
-def test_the_refusal_says_what_where_and_what_to_do(two_arms: Path, tmp_path: Path) -> None:
-    done = rrrid("run", "logs", "--json", "--out", "out", cwd=tmp_path)
-    told = json.loads(done.stdout)
-    assert (done.returncode, told["exit"], told["error"]["code"], told["error"]["where"]) == (2, 2, "RRID-C02", "logs")
-    assert told["error"]["sessions"] == ["arm-a", "arm-b"]
-    assert "arm-a (arm-a-excitation-1.h5, arm-a-excitation-2.h5); arm-b (arm-b-free-1.h5)" in done.stderr
-    assert "--session 'arm-a'" in done.stderr
-    assert "rrrid batch" in done.stderr
-    assert not (tmp_path / "out").exists()
-    planned = rrrid("run", "logs", "--dry-run", cwd=tmp_path)
-    assert (planned.returncode, planned.stdout) == (2, "")
-
-
 def test_one_can_be_taken_alone(two_arms: Path, tmp_path: Path) -> None:
     """--session gives what a folder of that session alone gives; a name that is none is refused with those that are."""
     (tmp_path / "alone").mkdir()
@@ -78,15 +65,6 @@ def test_one_can_be_taken_alone(two_arms: Path, tmp_path: Path) -> None:
     assert (wrong.returncode, wrong.stdout) == (2, "")
     assert "RRID-C01 --session: no session 'arm-c'" in wrong.stderr
     assert "arm-a, arm-b" in wrong.stderr
-
-
-@pytest.mark.parametrize("words", [
-    pytest.param(("inspect",), marks=pytest.mark.slow), ("convert",), ("simulate", "rrr", "--windowed", "--replay")])
-def test_commands_that_take_each_log_by_itself_have_the_option_too(words: tuple[str, ...], two_arms: Path, tmp_path: Path) -> None:
-    done = rrrid(*words, "logs", "--session", "arm-b", "--no-report", "--out", "out", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    named = rrrid("convert", *sorted(two_arms.iterdir()), "--no-report", "--out", "named", cwd=tmp_path)
-    assert named.returncode == 0, named.stderr  # logs that were named one by one
 
 
 def test_batch_takes_all(two_arms: Path, tmp_path: Path) -> None:

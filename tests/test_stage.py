@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
 import os
@@ -10,17 +9,16 @@ import signal
 import time
 import warnings
 from dataclasses import dataclass, replace
-from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
 from pipelines import convert, inspect, run
-from pipelines.errors import Check, InputRejected, RrridError, UsageError
+from pipelines.errors import Check, InputRejected, UsageError
 from pipelines.io.files import write_log
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, read_logs, run_stage, tilde
-from tests.io.logs import ROBOT_TEXT, small_log
+from tests.io.logs import small_log
 
 
 @pytest.fixture
@@ -91,17 +89,6 @@ def test_an_output_never_replaces_its_own_input(logs: Path, given: str) -> None:
     assert _contents(out) == before
 
 
-def test_a_source_folder_is_an_input_as_well(logs: Path) -> None:
-    """C05: what a stage's own reader was pointed at counts like the request's paths."""
-    def read(request: Request, settings: object) -> Inputs:
-        return replace(read_logs(request, settings), folders=(logs.parent / "recordings",))
-
-    (logs.parent / "recordings").mkdir()
-    stage = replace(_stage(lambda inputs, settings: _Nothing()), read=read)
-    with pytest.raises(UsageError, match="RRID-C05 .*inside the input .*recordings"):
-        run_stage(stage, Request((logs,), out=logs.parent / "recordings/out"), _Nothing())
-
-
 def test_an_edited_output_wants_force(logs: Path) -> None:
     """C05: a result that somebody worked on since is not rrrid's any more; --force says that it may go."""
     out = run_stage(convert.STAGE, _request(logs), convert.Settings()).folder
@@ -113,17 +100,6 @@ def test_an_edited_output_wants_force(logs: Path) -> None:
     (out / "added.txt").write_text("more")
     run_stage(convert.STAGE, _request(logs, force=True), convert.Settings())
     assert _mine(out) == before
-
-
-def test_provenance_knows_robot_seed_and_version(logs: Path) -> None:
-    """The description given with --robot is an input like any other; the seed is said, null where nothing is drawn."""
-    robot = logs.parent / "arm.toml"
-    robot.write_text(ROBOT_TEXT)
-    about = json.loads((run_stage(convert.STAGE, _request(logs, robot=str(robot)), convert.Settings()).folder
-                        / "provenance.json").read_text())
-    assert about["inputs"][tilde(str(robot))] == hashlib.sha256(robot.read_bytes()).hexdigest()
-    assert about["seed"] is None
-    assert about["version"] == version("rrrid")
 
 
 def test_a_result_does_not_depend_on_where_its_inputs_lie(tmp_path: Path) -> None:
@@ -143,29 +119,6 @@ def test_a_result_does_not_depend_on_where_its_inputs_lie(tmp_path: Path) -> Non
     assert contents[0] == contents[1]
 
 
-def test_an_error_names_the_path_as_it_was_given(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Inside, paths are absolute; on the terminal they are what the user typed."""
-    monkeypatch.chdir(logs.parent)
-    (logs / "b.h5").write_text("no log")
-    with pytest.raises(InputRejected) as caught:
-        run_stage(convert.STAGE, Request((Path("logs"),)), convert.Settings())
-    assert caught.value.where == "logs/b.h5"
-
-
-@pytest.mark.parametrize(("out", "allowed", "code"), [
-    ("out/new", False, "RRID-F13"), ("logs/a.h5/new", True, "RRID-C05"), ("/", True, "RRID-C05 /: is the root")])
-def test_a_folder_that_cannot_be_made_is_refused_before_the_work(
-        logs: Path, out: str, allowed: bool, code: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nobody waits for a result that then has no place."""
-
-    def work(inputs: Inputs, settings: _Nothing) -> _Nothing:
-        raise AssertionError("it was begun")
-
-    monkeypatch.setattr("pipelines.io.output.os.access", lambda path, mode: allowed)
-    with pytest.raises(RrridError, match=code):
-        run_stage(_stage(work), Request((logs / "a.h5",), out=logs.parent / out), _Nothing())
-
-
 @dataclass(frozen=True)
 class _Nothing:
     pass
@@ -174,25 +127,6 @@ class _Nothing:
 def _stage(compute: object, **more: object) -> Stage[_Nothing, _Nothing]:
     return Stage("convert", "A stage to test with", _Nothing, compute, lambda result: Report("Test", "done"), read_logs,  # type: ignore[arg-type]
                  **more)
-
-
-def test_an_earlier_output_does_not_go_aside_for_one_that_cannot_come(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The disk fails between the two moves: what lay there lies there again, and nothing beside it."""
-    monkeypatch.chdir(logs.parent)
-    first = run_stage(_stage(lambda inputs, settings: _Nothing()), Request((logs,)), _Nothing())
-    kept = _contents(first.folder)
-    move = os.replace
-
-    def fail(source: Path, target: Path) -> None:
-        if target == first.folder and "-of-" not in source.name:
-            raise OSError(errno.EIO, "the disk fails")
-        move(source, target)
-
-    monkeypatch.setattr("pipelines.io.output.os.replace", fail)
-    with pytest.raises(RrridError, match="RRID-P02"):
-        run_stage(_stage(lambda inputs, settings: _Nothing()), Request((logs,)), _Nothing())
-    assert [path.name for path in first.folder.parent.iterdir()] == ["convert"]
-    assert _contents(first.folder) == kept
 
 
 def test_an_input_that_changes_meanwhile_is_refused(logs: Path) -> None:

@@ -97,14 +97,6 @@ def test_found_is_exit_1_with_check_alone(lay: Lay) -> None:
     assert obey(lay({"c": "reject"}), check=True).exit_code == 4
 
 
-def test_an_item_that_failed_leaves_no_older_result(lay: Lay) -> None:
-    """What is in items/ belongs to the logs as they are now."""
-    root = lay({"a": "fine", "b": "fine"})
-    assert (obey(root).folder / "items/b/result.json").is_file()
-    outcome = obey(lay({"b": "reject"}))
-    assert [p.name for p in (outcome.folder / "items").iterdir()] == ["a"]
-
-
 @pytest.mark.row("P02")
 @pytest.mark.parametrize("fault", ["full", "unreadable"])
 def test_a_full_disk_stops_the_batch_and_it_can_go_on(lay: Lay, tmp_path: Path, fault: str) -> None:
@@ -123,15 +115,6 @@ def test_a_full_disk_stops_the_batch_and_it_can_go_on(lay: Lay, tmp_path: Path, 
     outcome = obey(lay({"05": "fine again"}), resume=True)
     assert outcome.exit_code == 0
     assert contents(outcome.folder) == whole
-
-
-def test_abort_stops_at_the_first_error(lay: Lay) -> None:
-    """--on-error abort: what was not begun is not done, and said so."""
-    outcome = obey(lay({"00": "reject"} | {f"{i:02d}": "sleep 0.02" for i in range(1, 40)}), abort=True)
-    codes = [(item["error"] or {}).get("code") for item in outcome.json["items"]]
-    assert outcome.exit_code == 4
-    assert codes[0] == "RRID-F02"
-    assert codes.count("RRID-P06") > 30
 
 
 @pytest.mark.row("C06")

@@ -53,17 +53,6 @@ def test_a_lock_that_was_left_behind_locks_nobody_out(tmp_path: Path) -> None:
         assert (tmp_path / "lock").read_text() == f"process {os.getpid()} on {platform.node()}"
 
 
-@pytest.mark.row("F13")
-def test_a_folder_that_is_there_is_enough(lay: Lay, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A shared folder made for the batch: what lies above it may be another's, but a new one cannot be made there."""
-    root, out = lay({"a": "fine"}), tmp_path / "mine"
-    out.mkdir()
-    monkeypatch.setattr("pipelines.io.output.os.access", lambda path, mode: path != tmp_path)
-    assert obey(root, out=out).exit_code == 0
-    with pytest.raises(EnvironmentFault, match="F13"):
-        obey(root, out=tmp_path / "new")
-
-
 @pytest.mark.row("C05")
 @pytest.mark.parametrize("what", ["foreign", "other", "added", "file", "link", "inside", "/"])
 def test_a_folder_that_is_not_a_batchs_is_refused(lay: Lay, tmp_path: Path, what: str) -> None:

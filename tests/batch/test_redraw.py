@@ -8,11 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.errors import InputRejected, UsageError
 from pipelines.rerender import rerender
 from pipelines.stage import Request
 from tests.batch.conftest import Lay, obey
-from tests.cli.commands import rrrid
 
 
 def everything(folder: Path) -> dict[str, bytes]:
@@ -44,28 +42,3 @@ def test_a_lost_page_comes_back(done: Path, tmp_path: Path) -> None:
     kept = [{name: content for name, content in files.items() if name != "provenance.json" and not name.startswith("ledger/")}
             for files in (everything(done), before)]
     assert kept[0] == kept[1]
-
-
-def test_what_is_no_batch_as_it_was_written_is_refused(done: Path, tmp_path: Path) -> None:
-    """A result that was edited, a foreign file in the folder, an output that is not free."""
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine/thesis.tex").write_text("x")
-    with pytest.raises(UsageError, match="C05"):
-        rerender(done, tmp_path / "mine")
-    (done / "notes.txt").write_text("x")
-    with pytest.raises(UsageError, match=r"C05.*notes\.txt"):
-        rerender(done)
-    (done / "notes.txt").unlink()
-    result = done / "result.json"
-    result.write_text(result.read_text().replace('"ok"', '"found"'))
-    with pytest.raises(InputRejected, match="F05"):
-        rerender(done)
-
-
-def test_on_the_command_line(done: Path, tmp_path: Path) -> None:
-    """`rrrid report` draws a batch's page as it does any other."""
-    before = everything(done)
-    (done / "report.html").unlink()
-    told = rrrid("report", "out", cwd=tmp_path)
-    assert (told.returncode, told.stdout.splitlines()[-1]) == (0, "→ out/report.html")
-    assert everything(done) == before

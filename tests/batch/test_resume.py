@@ -10,10 +10,9 @@ from pathlib import Path
 import pytest
 
 from pipelines import inspect
-from pipelines.batch import read_ledger, record_line, run_batch
-from pipelines.executor import Plan, Record
+from pipelines.batch import run_batch
+from pipelines.executor import Plan
 from pipelines.io.files import write_log
-from pipelines.report.batch_report import DoneItem
 from pipelines.stage import Request, run_stage
 from tests.batch.conftest import QUIET, Lay, contents, obey
 from tests.io.logs import small_log
@@ -45,17 +44,6 @@ def test_resume_does_only_what_is_not_done(lay: Lay) -> None:
     assert contents(out) == contents(whole)
 
 
-@pytest.mark.row("P09")
-def test_resume_with_other_settings_does_all_again(lay: Lay) -> None:
-    """P09: a setting that decides on results makes them old; memory and time limits do not."""
-    root = lay({"a": "value 1 std 0.1", "b": "fine"})
-    obey(root)
-    assert _kept(obey(root, timeout=100.0, memory=1 << 34, resume=True).folder) == 2
-    outcome = obey(root, factor=2.0, resume=True)
-    assert _kept(outcome.folder) == 0
-    assert json.loads((outcome.folder / "items/a/result.json").read_text())["parameters"][0]["value"] == 2.0
-
-
 @pytest.mark.row("P10")
 def test_a_corrupted_result_is_done_again(lay: Lay) -> None:
     """P10: one flipped byte, a missing file, an added file: found by their hashes, told, and made whole."""
@@ -70,41 +58,6 @@ def test_a_corrupted_result_is_done_again(lay: Lay) -> None:
     assert [(check.code, check.level, check.where) for check in outcome.checks] == [
         ("RRID-P10", "warn", "a"), ("RRID-P10", "warn", "b")]
     assert _kept(out) == 2
-
-
-def test_a_torn_ledger_is_no_ledger(lay: Lay) -> None:
-    """A power cut leaves an empty or half a record: its item is done again."""
-    root = lay({"a": "fine", "b": "fine"})
-    out = obey(root).folder
-    whole = contents(out)
-    ledger = out / "ledger/1-of-1.jsonl"
-    lines = [line for line in ledger.read_text().splitlines() if '"a"' not in line]
-    ledger.write_text("\n".join([*lines, '{"name": "a", "slu']))
-    obey(root, resume=True)
-    assert (contents(out), _kept(out)) == (whole, 1)
-
-
-def test_a_record_that_was_kept_says_what_it_said_at_once(tmp_path: Path) -> None:
-    """P07: the same figures in the same order, and so the same drift."""
-    said = ("reconstruct noise", "estimate-bps p10", "estimate-bps p2", "estimate-bps p1", "diagnose cogging joint 2 amplitude")
-    figures = dict.fromkeys(said, (1.0, 0.1, "N m"))
-    first, second = (Record(DoneItem(name, "ok", None, "", 0, "", name, None), name, figures, {f"{one} rms": (1.0, "N m") for one in said})
-                     for name in "ab")
-    (tmp_path / "ledger").mkdir()
-    (tmp_path / "ledger/1-of-1.jsonl").write_text(record_line(first) + record_line(second))
-    kept = read_ledger(tmp_path)
-    assert kept == {"a": first, "b": second}
-    assert list(kept["a"].figures) == list(said)
-
-
-def test_items_that_are_gone_leave_nothing_behind(lay: Lay) -> None:
-    """A folder that was renamed is not in the output under both names."""
-    root = lay({"a": "fine", "b": "fine"})
-    obey(root)
-    (root / "b").rename(root / "c")
-    out = obey(root, resume=True).folder
-    assert set(_times(out)) == {"a", "c"}
-    assert set(read_ledger(out)) == {"a", "c"}
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,6 @@ from bench.draw import draw_machine
 from bench.faults import fault_names, find_fault, make
 from bench.machine import Fault, Machine
 from bench.plant import Recording, run
-from pipelines.errors import UsageError
 from tests.bench.machines import sway, unrounded
 from tests.seeds import usually
 
@@ -76,8 +75,3 @@ def test_a_fault_is_frozen_and_says_what_it_is(name: str) -> None:
     assert all(np.isfinite(value).all() for value in fault.parameters().values())
     with pytest.raises(FrozenInstanceError):
         fault.joint = 1  # type: ignore[misc]
-
-
-def test_an_unknown_fault_is_refused() -> None:
-    with pytest.raises(UsageError, match="did you mean 'cogging'"):
-        find_fault("coging")

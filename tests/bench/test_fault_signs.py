@@ -20,12 +20,10 @@ import pytest
 
 from bench.config import SAMPLE_TIME
 from bench.control import Decentralised
-from bench.draw import paper_machine, with_links
+from bench.draw import paper_machine
 from bench.faults import fault_names, find_fault, make
 from bench.faults.load import Contact
-from bench.faults.structure import LinkLength
 from bench.machine import Fault, Machine, coulomb_viscous
-from bench.plan import Solid
 from bench.plant import Recording, run
 from tests.bench.machines import sway
 from tests.bench.test_rigid import standard_parameters
@@ -149,14 +147,6 @@ def coefficient(load: np.ndarray, column: np.ndarray, nuisance: np.ndarray) -> f
     return float(left @ inside / (inside @ inside))
 
 
-def test_nothing_is_left_of_a_healthy_machine() -> None:
-    """Pinocchio and the friction that was put in explain the torque to 2 mN m away from
-    reversals.
-    """
-    m = measured()
-    assert np.abs(np.where(np.abs(m.dq) > 0.1, m.load, 0.0)[20:]).max() < 2e-3
-
-
 @pytest.mark.parametrize(
     "joint", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)]
 )
@@ -183,16 +173,6 @@ def test_a_load_has_the_sign_and_the_size_of_its_answer(name: str, joint: int) -
         m.load[settled, j], column(m, j, Answer(**fault.parameters()))[settled], nuisance
     )
     assert abs(found - 1.0) < within, found
-
-
-def test_a_load_touches_no_other_row() -> None:
-    """Of load-dependent friction, torque gain and crosstalk at joint 2 the equations of the other
-    joints know nothing.
-    """
-    for name in ("load_friction", "torque_gain", "torque_crosstalk"):
-        m = measured(make(name, machine(), 2, seed=2))
-        other = np.where(np.abs(m.dq) > 0.1, m.load, 0.0)[20:, [0, 2]]
-        assert np.abs(other).max() < 4e-3, name
 
 
 @pytest.mark.parametrize(
@@ -244,23 +224,6 @@ def test_a_push_takes_torque_off_every_joint_by_the_jacobian() -> None:
         np.where(moving, m.load, 0.0)[20:], np.where(moving, expected, 0.0)[20:], atol=1e-2
     )
     assert (np.abs(expected).max(axis=0) > 0.5).all()
-
-
-def test_a_longer_link_is_a_longer_link() -> None:
-    """Pinocchio with a2 larger by the error, the link's body where it was on its axis, leaves
-    nothing; the drawing does.
-    """
-    error, robot = 0.012, machine().robot
-    joints = list(robot.joints)
-    joints[1] = replace(joints[1], a=joints[1].a + error)
-    bodies = [Solid.of_link(joint.link) for joint in robot.joints if joint.link is not None]
-    bodies[1] = replace(bodies[1], com=bodies[1].com - np.array([error, 0.0, 0.0]))
-    longer = with_links(replace(robot, joints=tuple(joints)), [body.as_link() for body in bodies])
-    recording = run(machine(), Decentralised(), SWAY, [LinkLength(None, error, 2)])
-    by_drawing, by_truth = (explained(recording, arm_of(one)) for one in (robot, longer))
-    moving = (np.abs(by_truth.dq) > 0.1)[20:]
-    assert np.abs(np.where(moving, by_truth.load[20:], 0.0)).max() < 2e-3
-    assert np.abs(np.where(moving, by_drawing.load[20:], 0.0)).max() > 0.1
 
 
 def test_an_encoder_follows_its_neighbour() -> None:

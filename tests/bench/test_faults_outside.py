@@ -11,29 +11,20 @@ import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 
-from bench.control import Decentralised, FeedForward, OpenLoop
+from bench.control import Decentralised, OpenLoop
 from bench.draw import paper_machine
 from bench.faults import fault_names, find_fault
 from bench.faults.drive import HuntingDrive
-from bench.faults.friction import CableHysteresis, RelativeDamper, SelfHeating, StickingSeal
-from bench.faults.load import LeakingCounterbalance, RattlingMass, SloshingLoad
-from bench.motions import Reference, at_rest, times
+from bench.faults.friction import StickingSeal
+from bench.faults.load import RattlingMass, SloshingLoad
+from bench.motions import at_rest, times
 from bench.plant import run
-from tests.bench.link_model import LinkModel
 from tests.bench.machines import CENTRE, Spy, frictionless, sway, turntable
-from tests.bench.test_fault_signs import arm_of, measured, turned
+from tests.bench.test_fault_signs import arm_of
 
 
 def test_at_least_six_kinds_are_outside_the_library() -> None:
     assert len([name for name in fault_names() if not find_fault(name).known]) >= 6
-
-
-def settled(*faults: object) -> tuple[np.ndarray, np.ndarray]:
-    """Position and torque (3,) after three seconds at rest, means of the last half second."""
-    recording = run(
-        frictionless(paper_machine().ideal), Decentralised(), at_rest(CENTRE, 3.0), faults
-    )  # type: ignore[arg-type]
-    return recording.true_q[-500:].mean(axis=0), recording.tau[-500:].mean(axis=0)
 
 
 def weight(q: np.ndarray, mass: float, offset: np.ndarray) -> np.ndarray:
@@ -46,17 +37,6 @@ def weight(q: np.ndarray, mass: float, offset: np.ndarray) -> np.ndarray:
         3, pin.Inertia(mass, np.zeros(3), np.eye(3) * 1e-9), pin.SE3(np.eye(3), at)
     )
     return np.array(pin.computeGeneralizedGravity(arm.model, arm.model.createData(), q))
-
-
-def test_a_rattling_mass_rests_on_the_wall_below() -> None:
-    """At rest it weighs m g at one end of its gap: where gravity pulls it, pressed in by m g sin
-    β/k.
-    """
-    fault = RattlingMass(None, 0.4, 0.02, (0.0, 1.0, 0.0))
-    q, tau = settled(fault)
-    fallen, other = (weight(q, 0.4, np.array([0.0, side * 0.01, 0.0])) for side in (-1.0, 1.0))
-    assert np.abs(tau - fallen).max() < 1e-3
-    assert np.abs(tau - other).max() > 0.02
 
 
 def test_a_rattling_mass_crosses_its_gap() -> None:
@@ -87,38 +67,6 @@ def test_a_sloshing_load_swings_at_its_frequency() -> None:
     spectrum = np.abs(np.fft.rfft(swing * np.hanning(swing.size), 1 << 17))
     assert abs(np.fft.rfftfreq(1 << 17, 1e-3)[spectrum.argmax()] - 2.0) < 0.1
     assert np.ptp(swing[:500]) > 1.5 * np.ptp(swing[-500:])
-
-
-@pytest.mark.slow
-def test_cables_dissipate_whatever_the_speed() -> None:
-    """Work over one closed cycle of bending is positive and the same at half the speed."""
-    work = []
-    for hz, duration in ((1.0, 2.0), (0.5, 4.0)):
-        t = times(duration)
-        w = 2.0 * math.pi * hz
-        q = np.outer(0.5 * (1.0 - np.cos(w * t)), [0.0, 1.0, 0.0]) + CENTRE
-        dq, ddq = (
-            np.outer(0.5 * w * np.sin(w * t), [0, 1, 0]),
-            np.outer(0.5 * w * w * np.cos(w * t), [0, 1, 0]),
-        )
-        reference = Reference(t, q, dq, ddq)
-        machine = frictionless(paper_machine().ideal)
-        law = FeedForward(
-            LinkModel(machine, error=0.0)
-        )  # or errors of tracking would differ with speed
-        well, sick = (
-            run(machine, law, reference, faults)
-            for faults in ([], [CableHysteresis(2, 1, 0.6, 0.4)])
-        )
-        last = slice(len(t) // 2, None)  # the second cycle
-        work.append(
-            sum(
-                float(np.sum((r.tau * r.true_dq)[last])) * sign * 1e-3
-                for r, sign in ((sick, 1.0), (well, -1.0))
-            )
-        )
-    assert work[0] > 0.1
-    assert abs(work[0] - work[1]) < 0.05 * work[0]
 
 
 def torn_loose(rest: float) -> np.ndarray:
@@ -157,19 +105,6 @@ def test_a_seal_sticks_the_longer_it_rests() -> None:
     assert speeds[0.5][-1] < 0.8 * speeds[0.0][-1]
 
 
-def test_a_strut_drags_with_the_root_of_the_relative_speed() -> None:
-    """c √|s| on joint 3 and -c √|s| on joint 2, s = v3 - v2, where s is fast; the waist feels
-    nothing.
-    """
-    m = measured(RelativeDamper(3, 2, 0.5))
-    s = m.dq[:, 2] - m.dq[:, 1]
-    expected = 0.5 * np.sqrt(np.abs(s)) * np.sign(s)
-    fast = (np.abs(m.dq) > 0.1).all(axis=1) & (np.abs(s) > 0.3)
-    np.testing.assert_allclose(m.load[fast, 2], expected[fast], atol=5e-3)
-    np.testing.assert_allclose(m.load[fast, 1], -expected[fast], atol=5e-3)
-    assert np.abs(m.load[fast, 0]).max() < 4e-3
-
-
 @pytest.mark.parametrize("torque", [0.0, 10.0])
 def test_a_drive_hunts_faster_under_torque(torque: float) -> None:
     """A sine of A at f (1 + 0.3 u/u_max) on top of the command."""
@@ -184,40 +119,3 @@ def test_a_drive_hunts_faster_under_torque(torque: float) -> None:
     t = (np.arange(len(applied)) + 1) * (1.0 / len(applied))
     rate = 5.0 * (1.0 + 0.3 * torque / machine.torque_limit[0])
     np.testing.assert_allclose(applied, 0.4 * np.sin(2.0 * math.pi * rate * t), atol=1e-6)
-
-
-def test_friction_falls_with_what_was_run_not_with_time() -> None:
-    """At one and the same time and speed, joint 1 that has run since the start rubs less than one
-    that has rested.
-    """
-    fault = SelfHeating(1, 0.8, 4.5, 0.5, 100.0)
-    m = measured(fault)
-    warm, v = 0.0, m.dq[:, 0]
-    expected = []
-    for speed in v:
-        warm += 1e-3 / 3.0 * (abs(speed) / 0.5 - warm)
-        expected.append(-0.8 * 4.5 * (1.0 - math.exp(-warm)) * turned(speed))
-    moving = np.abs(v) > 0.1
-    np.testing.assert_allclose(m.load[moving, 0], np.array(expected)[moving], atol=1e-2)
-    assert expected[-1] != 0.0
-
-
-def test_a_counterbalance_leaks_empty() -> None:
-    """Held half a radian away from its start, k p falls as an orifice lets it: √p linearly, √p =
-    √p0 - c t/2.
-    """
-    machine, moved = frictionless(paper_machine().ideal), 0.5
-    t = times(3.0)
-    s = np.clip(t / 0.3, 0.0, 1.0)
-    shape = moved * (10 * s**3 - 15 * s**4 + 6 * s**5)
-    rate = moved * 30 * s**2 * (1 - s) ** 2 / 0.3
-    curve = moved * 60 * s * (1 - s) * (1 - 2 * s) / 0.09
-    way = np.array([1.0, 0.0, 0.0])
-    reference = Reference(
-        t, CENTRE + np.outer(shape, way), np.outer(rate, way), np.outer(curve, way)
-    )
-    tau = run(machine, Decentralised(), reference, [LeakingCounterbalance(1, 2.5)]).tau[:, 0] / 2.5
-    settled = slice(800, 1200)  # the loop has rung out, the gas has not
-    slope = np.polyfit(t[settled], np.sqrt(tau[settled]), 1)[0]
-    assert abs(slope - -0.5) < 0.01
-    assert abs(tau[-1]) < 2e-3

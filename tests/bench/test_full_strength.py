@@ -6,20 +6,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from bench.control import Decentralised
-from bench.draw import machine_of, paper_machine
+from bench.draw import paper_machine
 from bench.faults import fault_names, find_fault, make
-from bench.machine import Fault, Machine, Parameters
-from bench.motions import Reference, sweeps
-from bench.plant import Recording, run
-from pipelines.errors import UsageError
-from pipelines.io.robot import Joint, RobotDescription
-from tests.bench.machines import turntable
+from bench.machine import Parameters
 
 S = (1.0, 0.7, 0.25)  # "joint factors 1, 0.7, 0.25 where s stands"
 FC, FV = (
@@ -59,13 +51,6 @@ LISTED: dict[str, dict[str, Callable[[int], float]]] = {
     "torque_lag": {"time_constant": lambda j: 5e-3},
 }
 RANGES = {"base_resonance": ("frequency", 24.0, 32.0), "contact": ("duration", 0.1, 0.3)}
-# Where ×0.3 and ×0.1 are listed too.
-WEAKER = {
-    "presliding": ("distance", 10e-3, 3e-3),
-    "torque_saturation": ("limit", 0.7 * 20.0, 0.82 * 20.0),
-    "joint_elasticity": ("frequency", 50.0, 80.0),
-    "base_resonance": ("inertia", 27.0, 80.0),
-}
 
 
 def at(name: str, joint: int = 2, strength: float = 1.0) -> Parameters:
@@ -89,120 +74,3 @@ def test_full_strength(name: str) -> None:
     if name in RANGES:
         key, low, high = RANGES[name]
         assert low <= found[key] <= high  # type: ignore[operator]
-
-
-@pytest.mark.parametrize("name", WEAKER)
-def test_weaker_by_the_list(name: str) -> None:
-    key, *values = WEAKER[name]
-    for strength, expected in zip((0.3, 0.1), values, strict=True):
-        assert at(name, 2, strength)[key] == pytest.approx(expected, rel=0.02)
-    whole = make(name, paper_machine(), 2, seed=6, peak_torque=PEAK)
-    assert whole.scaled(0.5).scaled(0.2).parameters() == pytest.approx(
-        whole.scaled(0.1).parameters()
-    )
-
-
-def gantry() -> Machine:
-    """Two slides that carry a turning joint."""
-    joints = (
-        Joint(
-            "x",
-            type="prismatic",
-            alpha=math.pi / 2,
-            position=(-0.4, 0.4),
-            velocity=1.0,
-            torque=200.0,
-        ),
-        Joint(
-            "y",
-            type="prismatic",
-            alpha=math.pi / 2,
-            position=(-0.4, 0.4),
-            velocity=1.0,
-            torque=120.0,
-        ),
-        Joint("wrist", a=0.2, velocity=6.0, torque=30.0),
-    )
-    return machine_of(RobotDescription("gantry", (0.0, 0.0, -9.81), "dh", joints), seed=2)
-
-
-@pytest.fixture(scope="module")
-def sound() -> tuple[Machine, Reference, Recording]:
-    """Return the healthy gantry, its reference, and its run."""
-    machine = gantry()
-    reference = sweeps(machine, np.random.default_rng(1), 0.2)
-    return machine, reference, run(machine, Decentralised(), reference)
-
-
-@pytest.mark.parametrize("name", fault_names())
-def test_a_slide_can_have_every_fault(
-    name: str, sound: tuple[Machine, Reference, Recording]
-) -> None:
-    """It moves or loads the machine, and no more than a machine survives: less than 10 cm."""
-    machine, reference, well = sound
-    peak = tuple(np.abs(well.tau).max(axis=0).tolist())
-    sick = run(
-        machine,
-        Decentralised(),
-        reference,
-        [make(name, machine, 1, 3, peak_torque=peak, duration=0.2)],
-    )
-    if (
-        name != "link_length"
-    ):  # where on a slide the next joint sits, neither inertia nor weight tells
-        assert np.abs(np.hstack([sick.true_q - well.true_q, sick.tau - well.tau])).max() > 1e-7
-    assert np.abs(sick.true_q - well.true_q)[:, :2].max() < 0.1
-
-
-def test_lengths_on_a_slide_are_a_tenth_of_a_metre_for_a_radian() -> None:
-    """So are speeds; stiffness and drag grow so that a stroke feels as much of them as a turn
-    does.
-    """
-    slide = gantry()
-    turn = replace(
-        slide,
-        robot=replace(
-            slide.robot,
-            joints=tuple(replace(joint, type="revolute") for joint in slide.robot.joints),
-        ),
-    )
-
-    def ratio(name: str, key: str) -> float:
-        a, b = (make(name, machine, 1, seed=3).parameters()[key] for machine in (slide, turn))
-        return float(a / b)  # type: ignore[operator]
-
-    for name, key in (
-        ("backlash", "gap"),
-        ("presliding", "distance"),
-        ("stribeck", "speed"),
-        ("concave_friction", "speed"),
-        ("spring", "rest_angle"),
-        ("encoder_eccentricity", "amplitude"),
-    ):
-        assert ratio(name, key) == pytest.approx(0.1), name
-    assert ratio("spring", "stiffness") == pytest.approx(10.0)
-    assert ratio("quadratic_drag", "coefficient") == pytest.approx(100.0)
-
-
-@pytest.mark.parametrize("name", ["torque_crosstalk", "encoder_crosstalk", "transmission_coupling"])
-def test_what_two_joints_share_needs_two(name: str) -> None:
-    with pytest.raises(UsageError, match="the machine has one"):
-        make(name, turntable(), 1)
-
-
-def faults_at(*names: str) -> list[Fault]:
-    return [make(name, paper_machine(), 2) for name in names]
-
-
-def test_one_joint_does_not_give_way_twice() -> None:
-    """A spring and a gap at one joint would silently be one of them: it is refused, at two joints
-    it is not.
-    """
-    from bench.plant import plan_with
-
-    with pytest.raises(UsageError, match="joint 2 gives way twice"):
-        plan_with(paper_machine(), faults_at("joint_elasticity", "backlash"))
-    both = plan_with(
-        paper_machine(), [make("joint_elasticity", paper_machine(), 1), *faults_at("backlash")]
-    )
-    assert [joint.twist is not None for joint in both.joints] == [True, True, False]

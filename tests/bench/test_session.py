@@ -14,9 +14,9 @@ from bench.draw import draw_machine
 from bench.experiments import Experiment
 from bench.faults import fault_names, make
 from bench.machine import Machine
-from bench.plant import answer, peak_torque, record
-from pipelines.io.files import open_log, write_log
-from pipelines.io.log import ExperimentLog, digest_of
+from bench.plant import answer, record
+from pipelines.io.files import write_log
+from pipelines.io.log import ExperimentLog
 from tests.bench.link_model import LinkModel
 from tests.bench.machines import CENTRE, sway
 
@@ -55,18 +55,6 @@ def of_a_moment(machine: Machine) -> tuple[Experiment, ExperimentLog]:
     """Record a short experiment on the healthy machine."""
     moment = experiments.free(machine, 1, duration=0.1)
     return moment, record(machine, [], [moment], seed=3)[0]
-
-
-def test_logs_are_of_the_format(logs: list[ExperimentLog], tmp_path: Path) -> None:
-    """Every kind is written and read again in both containers, unchanged, with nothing to be
-    said.
-    """
-    for log in logs:
-        for ending in ("h5", "parquet"):
-            write_log(tmp_path / f"{log.name}.{ending}", log)
-            opened = open_log(tmp_path / f"{log.name}.{ending}")
-            assert digest_of(opened.log) == digest_of(log)
-            assert not opened.checks
 
 
 def test_logs_pass_the_strict_checker(
@@ -116,17 +104,6 @@ def test_nothing_in_a_log_tells_the_fault(
         assert np.abs(values / step - np.round(values / step)).max() < 1e-6
 
 
-def test_references_are_their_own_derivatives(plans: list[Experiment]) -> None:
-    """dq and ddq against central differences of q and dq, to the order of the difference."""
-    for plan in plans:
-        r = plan.reference
-        for x, dx in ((r.q, r.dq), (r.dq, r.ddq)):
-            numeric = (x[2:] - x[:-2]) / 2e-3
-            scale = max(1.0, float(np.abs(r.ddq).max()))
-            assert np.abs(numeric - dx[1:-1]).max() < 0.02 * scale, plan.name
-        assert np.abs(r.dq[0]).max() < 1e-9, f"{plan.name} does not start at rest"
-
-
 def test_references_keep_the_limits(machine: Machine, plans: list[Experiment]) -> None:
     for plan in plans:
         for signal, key in ((plan.reference.dq, "velocity"), (plan.reference.ddq, "acceleration")):
@@ -151,25 +128,8 @@ def test_friction_logs_go_through_two_decades_of_speed_both_ways(
     assert (np.delete(log.controller.kp, joint - 1) > 0).all()  # type: ignore[union-attr, arg-type]
 
 
-def test_a_law_that_the_log_cannot_say_is_unknown(machine: Machine) -> None:
-    """Gravity balanced from the position is no open loop; the waist, which gravity leaves alone, is
-    driven open loop.
-    """
-    laws = [
-        experiments.friction(machine, joint, 2, duration=1.0).law.describe(machine).law
-        for joint in (1, 2, 3)
-    ]
-    assert laws == ["open-loop", "unknown", "unknown"]
-
-
 def test_answers_are_named_as_findings_are(machine: Machine) -> None:
     """Cause, joint and parameters."""
     found: Any = answer([make("cogging", machine, 2)])[0]
     assert (found["cause"], found["joint"]) == ("cogging", 2)
     assert {"order", "amplitude", "phase"} <= set(found["parameters"])
-
-
-def test_peak_torque(logs: list[ExperimentLog]) -> None:
-    assert peak_torque(logs[:2]) == tuple(
-        max(np.abs(log.tau[:, j]).max() for log in logs[:2]) for j in range(3)
-    )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,7 +12,7 @@ from typing import Any
 import pytest
 
 from pipelines import cache, estimate_bps, inspect, reconstruct, run, validate_writing
-from pipelines.cache import CACHE, Store
+from pipelines.cache import Store
 from pipelines.errors import EnvironmentFault, UsageError
 from pipelines.io.files import open_log, write_log
 from pipelines.io.log import ExperimentLog
@@ -89,28 +88,6 @@ def test_nothing_changed_nothing_computed(small: Path, monkeypatch: pytest.Monke
     assert contents(small / "out") == before
 
 
-@pytest.mark.parametrize("stage", ["estimate-bps", "validate-writing"])
-def test_a_stage_computed_upon_what_was_taken_back(whole: Path, stage: str) -> None:
-    """Motion read back from derived logs, a model from model.json with its covariance: the same bytes come out."""
-    before = contents(whole / "out")
-    shutil.rmtree(whole / "out" / CACHE / stage)
-    assert go(whole, LONG, no_report=True)[1] == [stage]
-    assert contents(whole / "out") == before
-
-
-def test_logs_may_move_and_be_touched(small: Path) -> None:
-    """Contents are compared: neither a time stamp nor another place on the disk is a change."""
-    before = contents(small / "out")
-    (small / "elsewhere").mkdir()
-    shutil.copytree(small / "logs", small / "elsewhere/logs", copy_function=shutil.copyfile)
-    shutil.rmtree(small / "logs")
-    (small / "elsewhere/logs").rename(small / "logs")
-    assert go(small, no_report=True)[1] == []
-    assert contents(small / "out") == before
-    assert go(small, replace(SHORT, no_cache=True), no_report=True)[1] == ["inspect", "reconstruct", "frf"]
-    assert contents(small / "out") == before
-
-
 def other_log(folder: Path) -> run.Settings:
     write_log(folder / "logs/2.h5", replace(controlled_log(400, 3), name="log 2"))
     return SHORT
@@ -181,17 +158,6 @@ def test_a_damaged_store_is_computed_again(small: Path, file: str) -> None:
     assert contents(small / "out") == before
 
 
-def test_what_a_person_may_have_edited_is_refused(whole: Path) -> None:
-    """C05: a model that somebody changed by hand is not overwritten without --force."""
-    model = whole / "out/estimate-bps/model.json"
-    before = model.read_bytes()
-    model.write_bytes(before.replace(b"1", b"2"))
-    with pytest.raises(UsageError, match="C05"):
-        go(whole, LONG, no_report=True)
-    assert go(whole, LONG, no_report=True, force=True)[1] == ["estimate-bps"]
-    assert model.read_bytes() == before
-
-
 @pytest.mark.row("X14")
 def test_no_output_names_the_user(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """X14: of a setting that holds a path below the home folder, key and results keep ~ alone, and fit under another home too."""
@@ -239,16 +205,6 @@ def test_an_interrupted_run_goes_on(small: Path, monkeypatch: pytest.MonkeyPatch
     assert sorted(p.name for p in small.iterdir()) == ["logs", "out"]
 
 
-def test_a_failed_run_leaves_nothing(small: Path) -> None:
-    """A run that ends in an error leaves what was there, and no hidden folder."""
-    before = contents(small / "out")
-    wrong = replace(SHORT, stages={"frf": import_module("pipelines.frf").Settings(low=-1.0)})
-    with pytest.raises(UsageError):
-        go(small, wrong, no_report=True)
-    assert contents(small / "out") == before
-    assert sorted(p.name for p in small.iterdir()) == ["logs", "out"]
-
-
 class Shut(ExperimentLog):
     """A log that says what it is, and shows no sample."""
 
@@ -285,10 +241,3 @@ def test_a_stage_reads_no_other_logs_than_it_says(module: str, samples: Path) ->
         assert stage.compute(replace(inputs, logs=shut), settings) is not None
     except NothingMatched:
         assert module == "frf"
-
-
-def test_entries_are_open_files(small: Path) -> None:
-    """What is stored is JSON, HDF5 and logs; the key stands in it in plain words."""
-    entry = json.loads((small / "out" / CACHE / "reconstruct/entry.json").read_text())
-    assert entry["about"]["key"]["log"] == {name: open_log(small / f"logs/{name}").sha256 for name in ("1.h5", "2.h5")}
-    assert {p.suffix for p in (small / "out").rglob("*") if p.is_file()} == {".json", ".h5"}

@@ -19,9 +19,7 @@ from pipelines.io.files import write_log
 from tests.cli.commands import rrrid
 from tests.healthy import good_log
 from tests.io.logs import small_log
-from tests.rows.commanded import Command, command
-
-__all__ = ["command"]
+from tests.rows.commanded import Command
 
 
 def _bytes(change: Callable[[bytes], bytes]) -> Callable[[Path], None]:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -17,11 +15,8 @@ import pytest
 from pipelines.effects import all_effects
 from pipelines.io.files import open_log, write_log
 from tests.cli.commands import REPO, rrrid
-from tests.healthy import good_log, with_signal
 from tests.io.logs import small_log
-from tests.rows.commanded import Command, command
-
-__all__ = ["command"]
+from tests.rows.commanded import Command
 
 
 def test_a_command_leaves_a_folder_and_says_where(logs: Path) -> None:
@@ -125,38 +120,6 @@ def test_wrong_usage_is_one_line_and_exit_2(logs: Path, words: tuple[str, ...], 
         assert not json_too or said.startswith(json.loads(done.stdout)["error"]["code"])
 
 
-@pytest.mark.parametrize(("words", "option"), [
-    (("design-excitation", "rrr", "--discriminate", "spring:2"), "--discriminate"),
-    (("reconstruct", "logs", "--order"), "--order")])
-def test_an_option_without_its_argument_is_one_of_a_command(tmp_path: Path, words: tuple[str, ...], option: str) -> None:
-    """Whose help has more: that of the command, and no list of all commands."""
-    done = rrrid(*words, cwd=tmp_path)
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert done.stderr.startswith(f"rrrid: RRID-C02 rrrid {words[0]}: option '{option}' requires ")
-    assert done.stderr.endswith(f" See 'rrrid {words[0]} --help'.\n")
-
-
-def test_rrrid_alone_says_its_help(tmp_path: Path) -> None:
-    """Without a command: the help, on standard error, exit 2. --version is one line."""
-    done = rrrid(cwd=tmp_path)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == rrrid("--help", cwd=tmp_path).stdout
-    assert rrrid("--version", cwd=tmp_path).stdout.startswith("rrrid 0.")
-
-
-@pytest.mark.parametrize(("command", "idle"), [("compare", "--robot"), ("compare", "--format"), ("demo", "--assume-units"),
-                                               ("inspect", "--format"), ("convert", "--check")])
-def test_help_is_silent_about_options_without_effect(command: str, idle: str, tmp_path: Path) -> None:
-    done = rrrid(command, "--help", cwd=tmp_path)
-    assert done.returncode == 0
-    assert "--no-report" in done.stdout
-    assert idle not in done.stdout.replace("before --format", "")
-
-
-def test_an_option_without_effect_is_taken(logs: Path) -> None:
-    assert rrrid("convert", "logs", "--check", "--no-report", "--out", "out", cwd=logs).returncode == 0
-
-
 def test_settings_come_from_file_then_set_then_options(logs: Path) -> None:
     """The last word has the command line; tables of other stages in the same file are left alone."""
     (logs / "c.toml").write_text('[convert]\nto = "csv"\n[inspect]\n')
@@ -169,15 +132,6 @@ def test_settings_come_from_file_then_set_then_options(logs: Path) -> None:
     assert (logs / "z/logs/a.parquet").is_file()
 
 
-def test_run_hands_settings_to_its_stages(logs: Path) -> None:
-    """--set inspect.trust_units=true does in `run` what --trust-units does in `inspect`."""
-    write_log(logs / "logs/a.h5", with_signal(good_log(), q=np.rad2deg(good_log().q)))
-    for sets, found in (((), True), (("--set", "inspect.trust_units=true"), False)):
-        done = rrrid("run", "logs", "--out", "out", "--no-report", "--json", *sets, cwd=logs)
-        checks = json.loads(done.stdout)["stages"][0]["result"]["checks"]
-        assert ("RRID-S07" in {check["code"] for check in checks if check["level"] != "ok"}) is found
-
-
 def test_format_decides_where_to_does_not(logs: Path) -> None:
     """convert --format h5 writes HDF5 of HDF5; --to has the last word, --set the one before."""
     for options, file in ((("--format", "h5"), "logs/a.h5"), (("--format", "h5", "--to", "parquet"), "logs/a.parquet"),
@@ -185,17 +139,6 @@ def test_format_decides_where_to_does_not(logs: Path) -> None:
         done = rrrid("convert", "logs", "--out", "out", "--no-report", *options, cwd=logs)
         assert done.returncode == 0, done.stderr
         assert (logs / "out" / file).is_file(), options
-
-
-def test_chosen_joints_are_converted(logs: Path) -> None:
-    """--joints with --robot: the log of the arm that is left, with a word; import, which has no joints yet, does not know it."""
-    robot = (REPO / "sample_logs/robots/rrr.toml").read_text()
-    (logs / "two.toml").write_text(robot[:robot.rindex("[[joint]]")])
-    done = rrrid("convert", "logs", "--joints", "1,2", "--robot", "two.toml", "--out", "out", cwd=logs)
-    assert done.returncode == 0, done.stderr
-    assert "RRID-S02 a.h5: joints 1, 2 of 3 are used" in done.stdout
-    assert np.array_equal(open_log(logs / "out/logs/a.parquet").log.q, small_log().q[:, :2])
-    assert rrrid("import", "x", "--joints", "1", cwd=logs).returncode == 2
 
 
 def test_an_estimate_loads_only_what_it_uses(tmp_path: Path) -> None:
@@ -219,20 +162,6 @@ def test_help_is_plain(tmp_path: Path) -> None:
     for name in ("run", "inspect", "import", "convert"):
         assert f"  {name} " in top
         assert "--out" in rrrid(name, "--help", cwd=tmp_path).stdout
-
-
-def test_help_names_what_set_takes(tmp_path: Path) -> None:
-    """The options of --set, for `run` those of every stage, are made of the stages' own settings."""
-    assert "--set convert.OPTION=VALUE, options: to." in rrrid("convert", "--help", cwd=tmp_path).stdout
-    assert "--set inspect.OPTION=VALUE, options: trust_units, allow_overlap." in rrrid("run", "--help", cwd=tmp_path).stdout
-
-
-@pytest.mark.parametrize("command", ["run", "diagnose", "extend"])
-def test_help_says_how_long_a_slow_command_takes(command: str, tmp_path: Path) -> None:
-    """With what that hangs on, in its own help; the list of all commands keeps to one sentence."""
-    own, listed = (" ".join(rrrid(*words, cwd=tmp_path).stdout.split()) for words in ((command, "--help"), ("--help",)))
-    assert re.search(r"Takes (some \d+ s|half a minute) for three joints and two minutes of motion", own)
-    assert "Takes" not in listed
 
 
 @pytest.mark.parametrize("command", ["extend", "diagnose", "simulate", "demo", "design-excitation"])
@@ -263,21 +192,6 @@ def test_all_bad_files_are_named(logs: Path) -> None:
     assert done.stderr.startswith("rrrid: RRID-F06 logs/b.h5: neither HDF5 nor Parquet; "
                                   "2 more cannot be used: c.h5 (RRID-F06), d.h5 (RRID-F01). ")
     assert not (logs / "out").exists()
-
-
-def test_what_is_made_of_own_output_stands_beside_it(logs: Path) -> None:
-    """runs/ROBOT/LABEL/COMMAND is the default of a stage on LABEL's own output too, so that two imports stay apart."""
-    for name in ("one", "two"):
-        write_log(logs / f"{name}/a.h5", small_log())
-        assert rrrid("convert", name, cwd=logs).returncode == 0
-        assert rrrid("convert", name, "--out", f"mine/{name}", cwd=logs).returncode == 0
-    runs = logs / "runs/rrr-tue"
-    for given, label in (("runs/rrr-tue/one/convert", "one"), ("runs/rrr-tue/two/convert/logs", "two"), ("mine/one", "one"),
-                         ("mine/two/logs/a.parquet", "two")):
-        assert rrrid("inspect", given, "--no-report", cwd=logs).returncode in (0, 3)
-        assert (runs / label / "inspect/result.json").is_file()
-        shutil.rmtree(runs / label / "inspect")
-    assert sorted(path.name for path in runs.iterdir()) == ["one", "two"]
 
 
 def test_schema_describes_the_shipped_model(tmp_path: Path, samples: Path) -> None:

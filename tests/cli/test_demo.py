@@ -7,7 +7,6 @@ import os
 import shutil
 import subprocess
 import sys
-import threading
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -16,14 +15,10 @@ import numpy as np
 import pytest
 
 from pipelines import demo
-from pipelines.diagnosis.result import Diagnosis, Finding, NotIdentifiable, Value
-from pipelines.errors import InputRejected
+from pipelines.diagnosis.result import Diagnosis, Finding, Value
 from pipelines.estimation.motion import Reconstruction, reconstruct
-from pipelines.io.files import write_log
 from pipelines.simulation.example import FAULT, example_arm, example_session
-from pipelines.stage import Request
 from tests.cli.commands import REPO, rrrid
-from tests.io.logs import small_log
 
 QUICK = ("--no-report", "--set", 'run.skip=["fit-friction", "estimate-bps", "validate-writing", "frf", "diagnose", "extend"]')
 
@@ -36,40 +31,6 @@ def test_the_hidden_fault_is_in_the_logs() -> None:
     missing = [np.sqrt(np.mean((log.tau - arm.torque(motion))[inside, 1]**2)) for arm in (example_arm(FAULT), example_arm())]
     assert missing[0] < 0.1
     assert missing[1] > 0.2
-
-
-def test_logs_and_what_was_hidden(tmp_path: Path) -> None:
-    """Logs that rrrid run takes, the run beside them; the end says what was hidden, what was found, and what to do next."""
-    done = rrrid("demo", *QUICK, "--fault", "quadratic_drag:3:coefficient=0.1", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    told, found, report, next_ = done.stdout.splitlines()[-4:]
-    assert told == "Was hidden: quadratic drag at joint 3 (coefficient 0.1 N m s²/rad²)."
-    assert found.startswith("Was found: ")
-    assert report.split(maxsplit=1) == ["Report:", "none was asked for"]
-    assert "rrrid run FOLDER" in next_
-    assert sorted(p.name for p in (tmp_path / "demo").iterdir()) == ["recording", "run"]
-    assert len(list((tmp_path / "demo/recording/logs").iterdir())) == 3
-    assert json.loads((tmp_path / "demo/run/result.json").read_text())["stages"][0]["name"] == "inspect"
-    refused = rrrid("demo", *QUICK, "--fault", "quadratic_dog:3", cwd=tmp_path)
-    assert (refused.returncode, "quadratic_drag" in refused.stderr) == (2, True)
-
-
-def test_an_arm_that_runs_away_is_told_of_the_fault() -> None:
-    """No log gave gains, and nobody gave a model: another number is what helps."""
-    with pytest.raises(InputRejected, match=r"RRID-D17 .*joint_elasticity:2:stiffness=2000.* another number") as refused:
-        demo.compute(demo.read(Request(()), demo.Settings()), demo.Settings(fault=("joint_elasticity:2:stiffness=2000",)))
-    assert "log" not in refused.value.remedy
-
-
-@pytest.mark.slow
-@pytest.mark.row("C05")
-def test_what_was_put_in_its_place_is_not_replaced(tmp_path: Path) -> None:
-    """Another command's result is where the logs go: it is refused, with what to do."""
-    write_log(tmp_path / "a.h5", small_log())
-    assert rrrid("convert", "a.h5", "--out", "demo/recording", "--no-report", cwd=tmp_path).returncode == 0
-    done = rrrid("demo", *QUICK, cwd=tmp_path)
-    assert done.returncode == 2
-    assert "holds the earlier result of convert" in done.stderr
 
 
 def test_without_mujoco_and_network(tmp_path: Path) -> None:
@@ -104,20 +65,6 @@ def test_the_end_lays_what_was_found_beside_what_was_hidden() -> None:
     assert len({end("no-fault-found"), end("unknown"), demo.ending(recorded, None)[1]}) == 3
 
 
-@pytest.mark.parametrize(("fault", "joint", "blind"), [
-    ("joint_elasticity:2:stiffness=2e4", None, True), ("rotor_inertia:1:inertia=0.1", 1, True), ("payload:mass=1", None, True),
-    ("rotor_inertia:3:inertia=0.1", 1, False), ("torque_gain:1:gain_error=0.1", None, False)])
-def test_what_such_logs_cannot_show_is_said_with_what_would(fault: str, joint: int | None, blind: bool) -> None:
-    """A spring that only frequency responses tell: nothing was found, for another reason than that nothing is there."""
-    beyond = NotIdentifiable(fault.split(":")[0], joint, "needs what nobody recorded", "Record that.")
-    nothing: Any = {field.name: None for field in fields(Diagnosis)}
-    found = Diagnosis(**(nothing | {"verdict": "no-fault-found", "findings": (), "not_identifiable": (beyond,)}))
-    _, second, *more = demo.ending(demo.Result("arm", (fault,), ()), found)
-    assert second.startswith("Was found:  nothing; of " if blind else "Was found:  nothing.")
-    assert ("such logs say nothing: needs what nobody recorded" in second) is blind
-    assert more == ["To see it:  Record that."] * blind
-
-
 @pytest.mark.slow
 def test_the_demo_names_what_it_hid(tmp_path: Path) -> None:
     """The whole of it: cogging at joint 2, its order within three std, nothing else."""
@@ -135,11 +82,3 @@ def test_a_place_that_is_taken_is_refused_before_the_arm_is_simulated(tmp_path: 
     done = rrrid("demo", *QUICK, cwd=tmp_path)
     assert (done.returncode, "RRID-C05 demo/run: " in done.stderr) == (2, True)
     assert [p.name for p in (tmp_path / "demo").iterdir()] == ["run"]
-
-
-def test_nothing_is_told_after_a_simulation_that_failed(tmp_path: Path) -> None:
-    """The thread that reports a long step ends with the command."""
-    before = set(threading.enumerate())
-    done = rrrid("demo", *QUICK, "--fault", "joint_elasticity:2:stiffness=2000", cwd=tmp_path)
-    assert done.returncode != 0
-    assert set(threading.enumerate()) <= before

@@ -42,16 +42,6 @@ def test_a_library_that_is_missing_or_too_old(monkeypatch: pytest.MonkeyPatch) -
     assert "rrrid[bench]" in named(found, "mujoco").remedy
 
 
-def test_the_libraries_of_the_export_are_listed_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pinocchio belongs to it alone, MuJoCo to the bench too."""
-    lines = ["mujoco>=3.3.1; extra == 'bench'", "mujoco>=3.3.1; extra == 'export'", "pin>=99.0; extra == 'export'"]
-    monkeypatch.setattr(importlib.metadata, "requires", lambda name: lines)
-    found = list(selfcheck.examine(with_self_test=False))
-    assert [one.name for one in found].count("mujoco") == 1
-    assert named(found, "pin").level == "warn"
-    assert "rrrid[export]" in named(found, "pin").remedy
-
-
 def test_folders_and_threads(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """A temporary folder that cannot be written is a fault, HOME is only remarked upon; many threads are slow."""
     monkeypatch.setattr(selfcheck.tempfile, "gettempdir", lambda: "/proc/nothing")
@@ -71,9 +61,3 @@ def test_what_breaks_in_the_self_test_is_named(monkeypatch: pytest.MonkeyPatch) 
     found = list(selfcheck.self_test())
     assert [one.level for one in found] == ["ok", "bad", "bad", "ok", "ok", "ok"]
     assert "HDF5 library version mismatch" in found[1].found
-
-
-def test_another_system_is_remarked_upon(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(selfcheck.platform, "system", lambda: "Darwin")
-    python = named(list(selfcheck.examine(with_self_test=False)), "Python")
-    assert (python.level, "Linux alone" in python.remedy) == ("warn", True)

@@ -15,7 +15,6 @@ import pytest
 from pipelines.errors import Interrupted, RrridError
 from pipelines.io.files import write_log
 from pipelines.io.output import hash_file
-from pipelines.io.sandbox import Answer, guarded
 from tests.cli.commands import REPO, RRRID
 from tests.io.logs import small_log
 
@@ -105,38 +104,3 @@ def test_no_handler_of_errors_catches_an_interruption() -> None:
     assert not issubclass(Interrupted, Exception)
     told = Interrupted(signal.SIGTERM).as_error()
     assert (type(told), told.exit_code, told.code) == (RrridError, 143, "RRID-P06")
-
-
-def test_a_signal_for_the_group_is_not_the_childs_answer(tmp_path: Path) -> None:
-    """The child that reads ignores what its parent answers: it neither dies of a signal nor makes an error of it."""
-    (tmp_path / "a").write_bytes(b"x")
-
-    def work() -> Answer:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            os.kill(os.getpid(), number)
-        return Answer({"still": "here"}, {})
-
-    assert guarded(work, tmp_path / "a").about == {"still": "here"}
-
-
-def test_a_child_is_born_deaf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A signal between the fork and the child's own handlers waits: the child never runs its parent's handler."""
-    (tmp_path / "a").write_bytes(b"x")
-    fork, parent = os.fork, os.getpid()
-
-    def forked() -> int:
-        child = fork()
-        if child == 0:
-            os.kill(os.getpid(), signal.SIGINT)
-        return child
-
-    def handler(number: int, _: object) -> None:
-        (tmp_path / ("parent" if os.getpid() == parent else "child")).touch()
-
-    monkeypatch.setattr(os, "fork", forked)
-    before = signal.signal(signal.SIGINT, handler)
-    try:
-        assert guarded(lambda: Answer({}, {}), tmp_path / "a").about == {}
-    finally:
-        signal.signal(signal.SIGINT, before)
-    assert not (tmp_path / "child").exists()

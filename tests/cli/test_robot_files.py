@@ -9,22 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.dynamics.arm import Arm
 from pipelines.errors import UsageError
-from pipelines.excitation.optimise import Effort, design
-from pipelines.excitation.task import Wishes, plan_task
 from pipelines.io.robot_files import load_robot
 from tests.cli.commands import rrrid
-
-
-def test_no_limit_of_torque_is_cut(shared: Path) -> None:
-    """Case 37: an arm that holds 589 N m at rest and may have 3000 N m gets a design, held against 2700 N m."""
-    robot = load_robot(shared / "cases" / "37-palletiser-3000-Nm" / "big.urdf")
-    found = design(plan_task(robot, Arm.from_links(robot), Wishes()), Effort(evaluations=30))
-    torques = [peak for peak in found.peaks if peak.quantity == "torque"]
-    assert [abs(peak.limit) for peak in torques] == [2700.0, 2700.0]
-    assert all(peak.share <= 1.0 for peak in torques)
-    assert max(abs(peak.peak) for peak in torques) > 589.0
 
 
 def test_infinite_limits_are_none(shared: Path, tmp_path: Path) -> None:
@@ -42,26 +29,6 @@ def test_infinite_limits_are_none(shared: Path, tmp_path: Path) -> None:
     assert "velocity in its <limit> in the URDF" in told.stderr
     path.write_text(text.replace('velocity="Infinity"', 'velocity="2"'))
     assert load_robot(path).joints[0].velocity == 2.0
-
-
-def test_a_range_open_at_one_end_keeps_the_other(shared: Path, tmp_path: Path) -> None:
-    """lower = -1, upper = inf: the range is from -1 on, and the text that a log carries says the same."""
-    path = tmp_path / "arm.urdf"
-    text = (shared / "cases" / "38-limits-inf" / "inf.urdf").read_text()
-    path.write_text(text.replace('lower="-2.5" upper="2.5"', 'lower="-1" upper="inf"'))
-    robot = load_robot(path)
-    assert robot.joints[1].position == (-1.0, math.inf)
-    path.write_text(str(robot.urdf_text))
-    assert load_robot(path).joints[1].position == (-1.0, math.inf)
-
-
-def test_the_range_of_a_continuous_joint_is_ignored(shared: Path) -> None:
-    """Case 40: lower above upper on a continuous joint says nothing; its effort and velocity count."""
-    robot = load_robot(shared / "cases" / "40-continuous-with-limits" / "contlim.urdf")
-    free = [joint for joint in robot.joints if joint.position == (-math.inf, math.inf)]
-    assert len(free) == 1
-    assert math.isfinite(free[0].velocity)
-    assert math.isfinite(free[0].torque)
 
 
 def test_a_link_that_cannot_exist_is_named(shared: Path, tmp_path: Path) -> None:
@@ -91,14 +58,6 @@ def test_other_robot_files_are_recognised_by_content(name: str, text: str, words
         load_robot(tmp_path / name)
 
 
-def test_mjcf_of_the_case_and_a_urdf_by_another_name(shared: Path, tmp_path: Path) -> None:
-    """Case 44 as it is given; a URDF that ends in .xml is read."""
-    with pytest.raises(UsageError, match="MJCF"):
-        load_robot(shared / "cases" / "44-mjcf-as-robot" / "arm.xml")
-    shutil.copy(shared / "real" / "tx40" / "tx40.urdf", tmp_path / "arm.xml")
-    assert load_robot(tmp_path / "arm.xml").n_joints == 6
-
-
 @pytest.mark.slow
 def test_the_remedy_for_a_branching_arm_works_where_it_is_given(shared: Path, tmp_path: Path) -> None:
     """Case 46: seven joints and two fingers. What the error offers works on the command line, in a recipe and in a description."""
@@ -119,10 +78,3 @@ def test_the_remedy_for_a_branching_arm_works_where_it_is_given(shared: Path, tm
         assert told.returncode == 0, told.stderr
     inspected = rrrid("inspect", "out1", "--robot", "arm.urdf:panda_hand", "--no-report", "--out", "i", cwd=tmp_path)
     assert inspected.returncode == 0, inspected.stderr
-
-
-def test_a_recipe_given_as_robot_is_recognised(shared: Path) -> None:
-    """The error says that the file is a recipe, and its remedy is the robot in it, in a form that can be read."""
-    with pytest.raises(UsageError, match=r"recipe of rrrid import.*: \S*arm\.urdf:panda_hand\.") as refused:
-        load_robot(shared / "cases" / "46-panda-tip-link-remedy" / "r2.toml")
-    assert load_robot(refused.value.remedy.rpartition(" ")[2]).n_joints == 7

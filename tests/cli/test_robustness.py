@@ -8,7 +8,6 @@ import shlex
 import shutil
 import signal
 import subprocess
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -16,13 +15,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.mutations import mutations, read_apart, warm_up
+from benchmarks.mutations import read_apart, warm_up
 from pipelines.errors import InputRejected, UsageError
 from pipelines.importers import patterns
 from pipelines.importers.patterns import matches
 from pipelines.io.model_file import parse_model
 from pipelines.io.robot import shipped
-from pipelines.io.sandbox import TomlError, parse_toml
 from tests.cli.commands import REPO, RRRID, rrrid
 
 SECONDS, MEGABYTES = 5.0, 500.0  # of CPU and of memory beyond the program's own
@@ -73,30 +71,6 @@ def test_a_hostile_text_costs_little(name: str) -> None:
     assert reading.megabytes < MEGABYTES
 
 
-@pytest.mark.usefixtures("_warm")
-def test_mutations_cost_little() -> None:
-    """Of 15 damaged texts none takes 5 s or 500 MB, or ends in an internal error (`python -m benchmarks.mutations`: of 10,000)."""
-    for k, (kind, text) in enumerate(mutations(15, seed=51)):
-        reading = read_apart(kind, text)
-        assert not reading.outcome.startswith("internal"), (k, reading.outcome)
-        assert reading.seconds < SECONDS, k
-        assert reading.megabytes < MEGABYTES, k
-
-
-def test_healthy_toml_is_within_the_bounds() -> None:
-    """Texts in texts, dates, dots in strings and comments, and a recipe of 3000 files are parsed as they are."""
-    long = "\n".join(f'[[file]]\nmatch = "run.{k}.a.b.c.d.e.f.g.csv"  # a.b.c.d.e.f.g.h' for k in range(3000))
-    assert len(parse_toml(long)["file"]) == 3000
-    urdf = "<robot>" + "<a.b.c.d.e.f.g/>\n" * 20_000 + "</robot>"
-    for quotes in ('"""', "'''"):
-        assert parse_toml(f"a.b = 1.5\nurdf = {quotes}\n{urdf}{quotes}\nwhen = 2024-05-17T11:30:00.25Z\n")["urdf"] == urdf
-    matrix = "[" + ", ".join("[" + ", ".join(["1.0"] * 100) + "]" for _ in range(100)) + "]"
-    assert np.shape(parse_toml(f"m = {matrix}")["m"]) == (100, 100)
-    for text in ("a = ", "a = 1\na = 2", "[a", 'a = "x', "a = " + "9" * 5000):
-        with pytest.raises(TomlError):
-            parse_toml(text)
-
-
 @pytest.mark.parametrize("pattern", ["{x:(a+)+}!.csv", pytest.param("*a" * 20 + "!", marks=pytest.mark.slow)])
 def test_a_pattern_cannot_hang_the_import(pattern: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An expression that would take ages is refused when its time, here a second, is over; healthy ones give their groups."""
@@ -140,26 +114,6 @@ def test_closed_streams_are_no_error(closed: str, logs: Path) -> None:
     assert (logs / "out" / "provenance.json").is_file()
 
 
-def test_an_encoding_without_our_signs(logs: Path) -> None:
-    """In ASCII the arrow becomes ->, and JSON means what it means in UTF-8."""
-    words = _shell("RRRID convert logs --to csv --out out", logs, PYTHONIOENCODING="ascii")
-    assert words.returncode == 0
-    assert b"-> " in words.stdout
-    command = ("convert", "logs", "--to", "csv", "--out", "out", "--json")
-    ascii_ = _shell(f"RRRID {shlex.join(command)}", logs, PYTHONIOENCODING="ascii")
-    assert json.loads(ascii_.stdout) == json.loads(rrrid(*command, cwd=logs).stdout)
-
-
-def test_a_deleted_working_folder(logs: Path) -> None:
-    """Exit 6 and one line where the place matters; where all paths are absolute the work is done."""
-    (logs / "gone").mkdir()
-    done = _shell(f"cd gone; rmdir ../gone; RRRID convert {logs}/logs --to csv; echo $?; "
-                  f"RRRID convert {logs}/logs --to csv --out {logs}/out -q; echo $?", logs)
-    assert done.stdout.split() == [b"6", b"0"]
-    assert done.stderr.count(b"\n") == 1
-    assert b"was deleted" in done.stderr
-
-
 def test_control_characters_of_a_path_are_escaped(logs: Path) -> None:
     """An escape sequence in one's own --out reaches no terminal; the path can still be read."""
     done = rrrid("convert", "logs", "--to", "csv", "--out", "a\x1b[31mb", cwd=logs)
@@ -171,42 +125,12 @@ def test_control_characters_of_a_path_are_escaped(logs: Path) -> None:
         assert "a\\x1b[31mb" in said.stdout
 
 
-@pytest.mark.parametrize("streams", ["2>/dev/full", ">/dev/full 2>/dev/full"])
-def test_an_error_that_cannot_be_printed_keeps_its_code(streams: str, tmp_path: Path) -> None:
-    """A full disk behind standard error."""
-    assert _shell(f"RRRID inspect nowhere {streams}", tmp_path).returncode == 2
-
-
 def test_a_full_standard_error_leaves_the_error_object(tmp_path: Path) -> None:
     done = _shell("RRRID inspect nowhere --json 2>/dev/full", tmp_path)
     assert done.returncode == json.loads(done.stdout)["exit"] == 2
     done = _shell("RRRID inspect nowhere --json >/dev/full", tmp_path)
     assert done.returncode == 2
     assert b"nowhere" in done.stderr
-
-
-def test_json_nested_without_end_beside_a_log_is_no_provenance(logs: Path) -> None:
-    """A provenance.json of 200,000 brackets, in a folder of logs and in one that is given for a result: no exit 70."""
-    (logs / "logs" / "provenance.json").write_text("[" * 200_000)
-    (logs / "logs" / "result.json").write_text("{}")
-    for words, code in ((("convert", "logs/a.h5", "--to", "csv", "--out", "out"), 0), (("report", "logs"), 3),
-                        (("compare", "logs", "logs"), 3), (("convert", "logs/a.h5", "--out", "logs"), 2)):
-        done = rrrid(*words, cwd=logs)
-        assert done.returncode == code, done.stderr
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="mounts are Linux's")
-@pytest.mark.parametrize("how", ["ro", "size=4k"])
-def test_without_shared_memory_a_batch_says_so(how: str, logs: Path) -> None:
-    """P04, exit 6: the locks of its workers need it."""
-    inside = f"mount -t tmpfs -o {how} none /dev/shm && {shlex.join(RRRID)} batch logs --stage convert --jobs 2"
-    done = subprocess.run(["unshare", "-m", "bash", "-c", inside], capture_output=True, text=True, cwd=logs, check=False,
-                          env=os.environ | {"PYTHONPATH": str(REPO)}, timeout=120)
-    if "unshare" in done.stderr or "mount" in done.stderr:
-        pytest.skip("mounting is not permitted here")
-    assert done.returncode == 6
-    assert "RRID-P04" in done.stderr
-    assert "/dev/shm" in done.stderr
 
 
 def test_a_killed_batch_leaves_no_temporary_folder(logs: Path) -> None:
@@ -241,44 +165,3 @@ def test_circles_of_links_cost_their_logs_alone(logs: Path) -> None:
     assert done.returncode in (0, 3), done.stderr  # 3: the small log holds no plausible motion
     assert [log["name"] for log in json.loads(done.stdout)["logs"]] == ["small"]
     assert {Path(c["where"]).name for c in json.loads(done.stdout)["checks"] if c["code"] == "RRID-X11"} == {"self.h5", "round"}
-
-
-def test_recordings_point_to_the_import(tmp_path: Path) -> None:
-    """`diagnose FOLDER_OF_CSV`: what drafts the recipe is named, with a file of that folder."""
-    for place in ("rec/run1.csv", "days/monday/arm/run1.npz"):
-        (tmp_path / place).parent.mkdir(parents=True)
-        (tmp_path / place).write_text("t,q\n0,1\n")
-        done = rrrid("diagnose", place.partition("/")[0], cwd=tmp_path)
-        assert done.returncode == 5
-        assert f"rrrid import --guess {place}" in done.stderr
-
-
-def test_a_short_log_says_by_how_much(tmp_path: Path) -> None:
-    """50 samples at 1 kHz: that 100 are needed, 0.1 s, in inspect and in the stage that refuses it."""
-    from dataclasses import replace
-
-    from pipelines.io.files import write_log
-    from tests.healthy import good_log
-
-    log = good_log()
-    short = {name: replace(signal, values=signal.values[:50]) for name, signal in log.signals.items()}
-    write_log(tmp_path / "logs" / "a.h5", replace(log, signals=short, period=None))
-    for command, code, stream in (("inspect", 0, "stdout"), ("estimate-bps", 3, "stderr")):
-        done = rrrid(command, "logs", "--no-report", cwd=tmp_path)
-        assert done.returncode == code
-        assert "RRID-T08" in getattr(done, stream)
-        assert "50 samples, 0.05 s" in getattr(done, stream)
-        assert "100" in getattr(done, stream)
-
-
-def test_a_verdict_is_never_cut_off() -> None:
-    """However much a run has to say, its last word is printed."""
-    from io import StringIO
-
-    from pipelines.report.report import Report
-    from rrrid_cli.console import print_verdict
-
-    stream = StringIO()
-    verdict = " ".join(f"Joint {k} has friction of its own." for k in range(200)) + " The end."
-    print_verdict(Report("Run", verdict, "attention", None, ()), stream)
-    assert stream.getvalue() == verdict + "\n"

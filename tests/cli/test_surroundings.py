@@ -101,11 +101,3 @@ def test_an_unreadable_log_is_exit_6(logs: Path, monkeypatch: pytest.MonkeyPatch
     done = rrrid("convert", "logs/a.h5", cwd=logs)
     assert done.returncode == 6
     assert done.stderr == "rrrid: RRID-F13 logs/a.h5: permission denied. Change its permissions.\n"
-
-
-def test_an_unwritable_place_is_named_as_it_was_given(logs: Path) -> None:
-    """Exit 6 names --out, never the hidden folder that was to become it."""
-    done = rrrid("convert", "logs", "--out", "/proc/mine", cwd=logs)
-    assert done.returncode == 6
-    assert " /proc/mine: " in done.stderr
-    assert "rrrid-tmp" not in done.stderr

@@ -60,14 +60,6 @@ def test_no_logs_is_wrong_usage(command: str, tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (2, "rrrid: RRID-C02 LOGS: no logs. Name logs, or folders of logs.\n")
 
 
-def test_help_cuts_no_sentence(tmp_path: Path) -> None:
-    """Every command's sentence stands there whole, in the order of the work."""
-    told = rrrid("--help", cwd=tmp_path, env={"COLUMNS": "80"}).stdout
-    assert "..." not in told.split("Commands:")[1]
-    listed = [line.split()[0] for line in told.split("Commands:\n")[1].splitlines() if line[2:3] != " "]
-    assert listed.index("run") < listed.index("inspect") < listed.index("estimate-bps") < listed.index("diagnose")
-
-
 @pytest.mark.parametrize(("line", "answer"), [("rrrid diag", "diagnose"), ("rrrid run --dry", "--dry-run")])
 def test_a_shell_completes(line: str, answer: str, tmp_path: Path) -> None:
     """Commands and options, as bash asks for them; the script that makes it ask is printed."""

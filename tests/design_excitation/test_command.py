@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.design_excitation import STAGE, Result
-from pipelines.errors import InputRejected, Interrupted, UsageError
+from pipelines.design_excitation import Result
+from pipelines.errors import InputRejected, UsageError
 from pipelines.inspect import STAGE as DOCTOR
 from pipelines.io.files import open_log
 from pipelines.stage import Outcome, Request, run_stage
@@ -99,14 +98,6 @@ def test_the_table_comes_back_through_its_recipe(tmp_path: Path) -> None:
     np.testing.assert_allclose(imported.q, planned["q_ref"][::2], atol=1e-9)
 
 
-def test_fundamentals_of_their_own(tmp_path: Path) -> None:
-    """0.1, 0.2 and 0.3 Hz: each joint moves at multiples of its own alone."""
-    out = designed(tmp_path / "out", replace(QUICK, frequency=(0.1, 0.2, 0.3), harmonics=(12, 8, 5))).folder
-    told = json.loads((out / "coefficients.json").read_text())
-    assert told["period"] == pytest.approx(10.0)
-    assert [joint["harmonics"] for joint in told["joints"]] == [list(range(1, 13)), list(range(2, 17, 2)), list(range(3, 16, 3))]
-
-
 def test_a_rehearsal_before_the_robot_moves(tmp_path: Path) -> None:
     """The simulated arm follows a modest plan to a few hundredths of a radian, without saturation."""
     done = designed(tmp_path / "out", replace(QUICK, rehearse=True)).result
@@ -114,29 +105,6 @@ def test_a_rehearsal_before_the_robot_moves(tmp_path: Path) -> None:
     assert done.rehearsal.safe
     assert max(done.rehearsal.position_max) < 0.1
     assert all(peak < limit for peak, limit in zip(done.rehearsal.torque_peak, done.rehearsal.torque_limit, strict=True))
-
-
-def test_who_stops_the_rehearsal_keeps_the_motion_with_all_its_files(plain: Outcome[Result], tmp_path: Path,
-                                                                     monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ctrl-C while it is simulated: the motion that was searched, exit 130, and no word of a rehearsal."""
-    def stopped(*given: object) -> None:
-        raise Interrupted(signal.SIGINT)
-
-    monkeypatch.setattr("pipelines.excitation.rehearsal.rehearse", stopped)
-    outcome = designed(tmp_path / "out", replace(QUICK, rehearse=True))
-    for name in ("trajectory.h5", "controller.csv", "coefficients.json", "result.json"):
-        assert (outcome.folder / name).is_file()
-    assert (outcome.folder / "controller.csv").read_bytes() == (plain.folder / "controller.csv").read_bytes()
-    assert (outcome.result.rehearsal, outcome.json["interrupted"]) == (None, True)
-    assert STAGE.exit_code(outcome.result, False) == 130
-    assert "interrupted" in outcome.report.verdict
-
-
-def test_the_report_warns_in_bold(tmp_path: Path) -> None:
-    outcome = run_stage(STAGE, Request((), out=tmp_path / "out"), QUICK)
-    page = (outcome.folder / "report.html").read_text()
-    assert "<strong>Self-collision is not checked" in page
-    assert "√(3/2)" in page
 
 
 @pytest.mark.parametrize(("changes", "code"), [

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.errors import InputRejected, UsageError
+from pipelines.errors import UsageError
 from pipelines.io.results import headed
 from pipelines.io.robot_files import load_robot
 from tests.design_excitation.short import QUICK, designed
@@ -36,12 +36,6 @@ def test_a_mode_that_cannot_be_kept_below_is_said(responses: object, code: str, 
     with pytest.raises(UsageError) as told:
         designed(tmp_path / "out", QUICK, (tmp_path / "frf",))
     assert told.value.code == code
-
-
-def test_a_result_of_an_earlier_version_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "result.json").write_text(json.dumps({"command": "frf", "responses": []}))
-    with pytest.raises(InputRejected, match="F17.*written by an earlier rrrid.*Run the command again"):
-        designed(tmp_path / "out", QUICK, (tmp_path / "result.json",))
 
 
 def test_earlier_logs_count(tmp_path: Path, samples: Path) -> None:

@@ -10,7 +10,6 @@ import pytest
 
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.base_parameters import BaseArm
-from pipelines.errors import UsageError
 from pipelines.inspect import STAGE as DOCTOR
 from pipelines.io.files import open_log
 from pipelines.io.robot_files import load_robot
@@ -72,16 +71,6 @@ def test_frf_plans_tell_distortion_from_noise(tmp_path: Path) -> None:
     assert abs(np.corrcoef(one["v"][:period, 1], two["v"][:period, 1])[0, 1]) < 0.1
 
 
-def test_random_noise_in_the_place_of_multisines(tmp_path: Path) -> None:
-    """As in the paper: white, of no period, and drawn anew for the second log."""
-    out = designed(tmp_path / "out", replace(QUICK, experiment="frf", random=True)).folder
-    one, two = (open_log(out / f"logs/frf-1-{k}.h5").log for k in (1, 2))
-    v, w = one["v"][:, 0], two["v"][:, 0]
-    assert one.period is None
-    assert abs(np.corrcoef(v[1:], v[:-1])[0, 1]) < 0.03
-    assert abs(np.corrcoef(v, w)[0, 1]) < 0.03
-
-
 def test_held_postures_show_gravity(tmp_path: Path) -> None:
     """Together the postures determine all four parameters of gravity (rank 4, verified.md, section 3)."""
     out = designed(tmp_path / "out", replace(QUICK, experiment="hold")).folder
@@ -95,15 +84,6 @@ def test_held_postures_show_gravity(tmp_path: Path) -> None:
     assert p is not None
     tau = BaseArm(body.robot).torque(postures, still, still, p)
     assert (np.abs(tau) <= 0.9 * np.array([60.0, 30.0, 15.0])).all()
-
-
-def test_held_postures_stay_in_the_box(tmp_path: Path) -> None:
-    box = (-0.4, 0.4, -0.4, 0.4, 0.4, 1.0)
-    out = designed(tmp_path / "out", replace(QUICK, experiment="hold", tip_box=box)).folder
-    postures = np.array([open_log(path).log.posture for path in (out / "logs").glob("*.h5")])
-    tip = BaseArm(load_robot("rrr")).tip(postures)
-    assert len(tip) == 8
-    assert ((tip >= np.array(box[::2])) & (tip <= np.array(box[1::2]))).all()
 
 
 @pytest.mark.parametrize("purpose", [*rarely("friction"), "frf"])
@@ -121,20 +101,3 @@ def test_plans_keep_the_tip_speed_and_the_torque(purpose: str, tmp_path: Path) -
         ddq = log["ddq_ref"] + log["v"] if purpose == "frf" else log["ddq_ref"]
         tau = arm.torque(log["q_ref"], log["dq_ref"], ddq, p)
         assert (np.abs(tau).max(axis=0) <= 0.9 * np.array([60.0, 30.0, 15.0])).all()
-
-
-def test_a_plan_that_no_limit_allows_names_the_limit(tmp_path: Path) -> None:
-    """Home lies outside the box: every friction plan leaves it."""
-    with pytest.raises(UsageError) as told:
-        designed(tmp_path / "out", replace(QUICK, experiment="friction", tip_box=(5.0, 6.0, -1.0, 1.0, 0.0, 2.0)))
-    assert told.value.code == "RRID-C08"
-    assert "tip x" in told.value.message
-
-
-def test_plans_are_rehearsed(tmp_path: Path) -> None:
-    """The simulated arm holds each posture, and no drive saturates."""
-    done = designed(tmp_path / "out", replace(QUICK, experiment="hold", rehearse=True)).result
-    assert len(done.rehearsals) == 8
-    for _, found in done.rehearsals:
-        assert found.safe
-        assert max(found.position_max) < 0.05

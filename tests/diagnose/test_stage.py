@@ -14,7 +14,7 @@ import pytest
 
 from bench.draw import draw_machine
 from bench.faults import make
-from pipelines import diagnose, run
+from pipelines import diagnose
 from pipelines.errors import UsageError
 from pipelines.stage import Outcome, Request, run_stage
 from tests.diagnose.sessions import but, healthy_again, session, written
@@ -88,25 +88,6 @@ def test_a_cause_is_named_without_reference_logs(seconds: float, tmp_path: Path)
     assert found.result.findings[0].parameters["amplitude"].value == pytest.approx(0.28, rel=0.05)
 
 
-def test_the_report_says_what_to_check(rippled: Outcome[diagnose.Result]) -> None:
-    """Verdict in words, the remedy, the joint, millimetres at the tip; and the figure that proves it."""
-    report = rippled.report
-    assert "Cogging at joint 2" in report.verdict
-    assert report.sections[0].title == "What the logged torque is"
-    first = report.sections[1]
-    assert any(text.startswith("What to check: ") for text in first.text)
-    assert any(" mm " in text for text in first.text)
-    assert first.figures[0].name == "proof-1"
-    assert {"What this rests on", "Detection limits"} <= {section.title for section in report.sections}
-
-
-def test_it_is_said_which_laws_and_thresholds_a_diagnosis_took(rippled: Outcome[diagnose.Result]) -> None:
-    told = " ".join(words for section in rippled.report.sections for words in section.text)
-    assert "Friction laws: Coulomb and viscous to begin with, fitted here, alone and in a run" in told
-    assert "--set diagnose.model=FILE" in told
-    assert "Thresholds: " in told
-
-
 def test_without_a_name_the_nearest_explanations_are_told(rippled: Outcome[diagnose.Result]) -> None:
     """Where nothing exceeded its threshold nothing was fitted, and first order tells: cogging, most of what joint 2 leaves."""
     ledger = tuple(replace(one, exact_gain=math.nan, accepted=False) for one in rippled.result.candidate_causes)
@@ -169,11 +150,3 @@ def test_settings_that_make_no_sense_are_refused(settings: dict[str, object], wo
     with pytest.raises(UsageError) as refused:
         asked(folder, tmp_path / "out", **settings)
     assert words in str(refused.value)
-
-
-def test_a_run_refuses_them_before_its_first_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run, "_computed", lambda *given: pytest.fail("was not refused at once"))
-    folder = written(tmp_path / "logs", session())
-    settings = run.Settings(stages={"diagnose": diagnose.Settings(min_speed=(-1.0,))})
-    with pytest.raises(UsageError, match="--min-speed"):
-        run_stage(run.STAGE, Request((folder,), out=tmp_path / "out", no_report=True), settings)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from benchmarks.hidden_effects.cases import SealedCase
@@ -59,13 +58,3 @@ def test_reference_logs_tell_at_which_joint_it_is(planar: tuple[ExperimentLog, .
     assert [one.key for one in found.decision.causes] == [("torque_gain", joint)]
     (scale,) = found.look.selection.end.model.effects
     assert abs(scale.values["gain_error"] - (1.0 / WRONG - 1.0)) < 0.005  # applied is less than logged
-
-
-@pytest.mark.slow
-def test_what_is_seen_at_its_joint_alone_has_its_name_there(planar: tuple[ExperimentLog, ...]) -> None:
-    """Torque that is offset at one of the same joints."""
-    def offset(log: ExperimentLog) -> ExperimentLog:
-        return replace(log, signals={**log.signals, "tau": replace(log.signals["tau"], values=log.tau + np.array([0.0, 0.3]))})
-
-    found = diagnosed(tuple(offset(log) for log in planar), "torque_gain", "torque_offset")
-    assert [(one.cause, one.joint) for one in found.findings] == [("torque_offset", 2)]

@@ -10,11 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench import experiments
-from bench.draw import draw_machine
-from bench.plant import record
 from pipelines.diagnosis.findings import gain_of
-from pipelines.dynamics.body import Motion
 from pipelines.estimation.estimate import Recipe
 from pipelines.estimation.exact_model import Exact
 from pipelines.estimation.model_fit import TorqueGain, no_better, worse_log
@@ -58,67 +54,6 @@ def test_a_window_in_which_the_arm_runs_away_is_not_left_out(monkeypatch: pytest
     assert (first.how, second.how) == ("windowed", "none")
 
 
-@pytest.fixture(scope="module")
-def long() -> tuple[Any, Any]:
-    """Six seconds of one log, and an arm fitted to them."""
-    prepared = prepare(Logs((session(seconds=6.0, logs=1)[0],)), Recipe())
-    columns, fit = fit_nominal(prepared.data, prepared.columns)
-    return prepared.motions[0], Exact.start(columns, fit).arm
-
-
-def test_the_simulated_span_is_where_the_measured_arm_counts(long: tuple[Any, Any]) -> None:
-    """In closed loop: behind the seconds that are told a measured position changes nothing, before their end it does."""
-    (log, found), arm = long
-    first = simulation_errors([arm], ((log, found),))[0]
-    span = first.span[0]
-    assert (first.how, span.log) == ("closed-loop", log.name)
-    assert 1.0 < span.seconds < 5.9
-    end = round(span.seconds / log.sample_time)
-    for sample, same in ((end, True), (end - 1, False)):
-        q = log.q.copy()
-        q[sample] += 0.1
-        moved = replace(log, signals={**log.signals, "q": replace(log.signals["q"], values=q)})
-        assert (simulation_errors([arm], ((moved, found),))[0].tip_rms == first.tip_rms) == same
-
-
-@pytest.mark.slow
-def test_longer_stretches_are_simulated_where_the_last_arm_comes_no_nearer(long: tuple[Any, Any]) -> None:
-    """An arm that is worse first, and then the fitted one: what is short tells. The same two the other way round, and one arm
-    twice, are told apart by all of the log."""
-    (log, found), arm = long
-    heavy = replace(arm, base=tuple(replace(one, value=1.2 * one.value) for one in arm.base))
-    assert [one.span[0].seconds for one in simulation_errors([heavy, arm], ((log, found),))] == [5.0, 5.0]
-    for arms in ([arm, heavy], [arm, replace(arm)]):
-        both = simulation_errors(arms, ((log, found),))
-        assert [one.span[0].seconds for one in both] == pytest.approx([6.0, 6.0], abs=0.01)
-
-
-def test_the_simulated_span_of_windows_is_all_that_they_cover(long: tuple[Any, Any]) -> None:
-    """Without a controller nearly all of the log is simulated, 0.1 s at a time, and half of it where half can be used."""
-    (log, found), arm = long
-    bare = replace(log, controller=None)
-    good = found.good.fit & (np.arange(len(found.good.fit)) < len(found.good.fit) / 2)
-    half: Any = replace(found, good=SimpleNamespace(kept=found.good.kept, fit=good))
-    whole, part = (simulation_errors([arm], ((bare, motion),))[0] for motion in (found, half))
-    assert (whole.how, part.how) == ("windowed", "windowed")
-    assert 5.0 < whole.span[0].seconds <= 6.01
-    assert part.span[0].seconds == pytest.approx(0.5 * whole.span[0].seconds, abs=0.3)
-
-
-def test_a_fast_log_drives_its_windows_by_the_mean_torque_of_a_millisecond() -> None:
-    """Five samples of 0.2 ms make one; none is left of a millisecond of which a sample is missing, or of no use."""
-    t = np.delete(2e-4 * np.arange(61), 23)
-    tau = RNG.normal(size=(60, 3))
-    usable = np.arange(60) != 11
-    motion = Motion(t, *(RNG.normal(size=(60, 3)) for _ in range(3)))
-    thin, mean, left, every = gains._coarser(motion, tau, usable, 2e-4)
-    assert every == 5
-    np.testing.assert_array_equal(thin.q, motion.q[::5])
-    np.testing.assert_allclose(mean[1], tau[5:10].mean(axis=0), rtol=1e-12)
-    assert left.tolist() == [k not in (2, 4) for k in range(12)]
-    assert gains._coarser(motion, tau, usable, 1e-3) == (motion, tau, usable, 1)
-
-
 def two_logs() -> Any:
     """Two logs of 100 rows of each of two joints."""
     joint = np.tile(np.repeat([0, 1], 100), 2)
@@ -144,16 +79,6 @@ def test_a_further_cause_has_to_predict_held_out_torque_better() -> None:
     assert not no_better(data, large, np.where(data.joint == 0, 0.999, 1.0) * large)
     assert no_better(data, large, large)
     assert no_better(data, large, np.where(data.joint == 0, 0.999, 1.002) * large)
-
-
-def test_rows_of_a_joint_that_is_held_do_not_count() -> None:
-    """Joint 1 to and fro, the others at rest: they stick, and no law tells their torque. In the other log all three count."""
-    machine = draw_machine(7, "fault")
-    (fro,) = record(machine, (), [experiments.reversal(machine, 1, 2.0)], 3)
-    data = prepare(Logs((session()[0], replace(fro, role="identify"))), Recipe()).data
-    counted = {(log, joint): bool(data.counts[(data.log_of == log) & (data.joint == joint)].all())
-               for log in (0, 1) for joint in (0, 1, 2)}
-    assert counted == {(0, 0): True, (0, 1): True, (0, 2): True, (1, 0): True, (1, 1): False, (1, 2): False}
 
 
 def test_a_slide_counts_by_its_own_travel_beside_a_joint_that_turns() -> None:

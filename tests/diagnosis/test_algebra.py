@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.candidates import Group
-from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.prior import Belief
-from pipelines.diagnosis.score import Blocks, confidence_set
+from pipelines.diagnosis.score import Blocks
 from pipelines.diagnosis.screening import screen
 from pipelines.estimation.joint_table import (
     Array,
@@ -124,53 +123,6 @@ def test_a_block_is_predicted_beside_effects_as_by_a_fit_of_all_numbers_without_
         assert losses[b] == pytest.approx(left @ left, rel=1e-6)
 
 
-def test_columns_stay_what_they_were_when_chosen_stacked_and_scaled(
-    rng: np.random.Generator,
-) -> None:
-    base, more, y, _, joint = _problem(rng)
-    table = Table.stacked([Table.of(base, joint, _JOINTS), Table.of(more, joint, _JOINTS)])
-    dense = np.concatenate([base, more])
-    chosen, factor = np.array([6, 3, 0]), np.array([2.0, -1.0, 0.5])
-    some = table.take(chosen).scaled(factor)
-    assert some.gram(table) == pytest.approx((dense[chosen] * factor[:, None]) @ dense.T)
-    assert some.moments(by_joint(y, joint, _JOINTS)) == pytest.approx(
-        (dense[chosen] * factor[:, None]) @ y
-    )
-    assert some.norms == pytest.approx(np.linalg.norm(dense[chosen], axis=1) * np.abs(factor))
-
-
-def test_columns_in_one_piece_are_those_of_several(rng: np.random.Generator) -> None:
-    """Candidates are kept in single precision, those of drives are replaced, groups have products."""
-    base, more, _, _, joint = _problem(rng)
-    table = Table.stacked([Table.of(base, joint, _JOINTS), Table.of(more, joint, _JOINTS)])
-    dense, at = np.concatenate([base, more]), np.array([1, 6])
-    new = rng.normal(size=(2, _ROWS)) * (joint == 0)
-    one = table.compact().replaced(at, Table.of(new, joint, _JOINTS))
-    dense[at] = new
-    mask = by_joint(rng.random(_ROWS) < 0.5, joint, _JOINTS)
-    every = np.concatenate(mask)
-    for group, square in zip((spans := [slice(0, 3), slice(3, 7)]), one.squares(spans), strict=True):
-        assert square == pytest.approx(dense[group] @ dense[group].T, abs=1e-5)
-    for group, square in zip(spans, one.squares(spans, mask), strict=True):
-        own = dense[group][:, every]
-        assert square == pytest.approx(own @ own.T, abs=1e-5)
-    twice = one.mapped(lambda x, _: 2.0 * x)
-    assert twice.gram(one, mask) == pytest.approx(2.0 * dense[:, every] @ dense[:, every].T, abs=1e-4)
-    assert np.concatenate([one.dense(j) for j in range(_JOINTS)], 1) == pytest.approx(dense, abs=1e-6)
-
-
-def test_models_are_dropped_where_they_predict_worse_and_kept_where_chance_decides(
-    rng: np.random.Generator,
-) -> None:
-    common = rng.normal(size=40)
-    scores = {
-        "best": common,
-        "like it": common + rng.normal(0.0, 0.1, 40),
-        "worse": common + 1.0 + rng.normal(0.0, 0.1, 40),
-    }
-    assert set(confidence_set(scores, DiagnosisConfig())) == {"best", "like it"}
-
-
 def test_arrow_shaped_information_is_solved_as_a_dense_matrix(rng: np.random.Generator) -> None:
     base, more, y, _, joint = _problem(rng)
     columns = np.concatenate([base, more])
@@ -184,11 +136,3 @@ def test_arrow_shaped_information_is_solved_as_a_dense_matrix(rng: np.random.Gen
     there = columns[:, joint == 2]
     gram = there.T @ np.linalg.solve(dense, there)
     assert own.T @ own + shared.T @ shared == pytest.approx(gram)
-
-
-def test_a_matrix_without_the_structure_is_solved_as_well(rng: np.random.Generator) -> None:
-    base, more, _, _, joint = _problem(rng)
-    table = Table.of(np.concatenate([base, more]), joint, _JOINTS)
-    root = rng.normal(size=(_KNOWN + _MORE,) * 2)
-    arrow = Arrow.of(root @ root.T, Structure.of(table))
-    assert arrow.inverse_diagonal == pytest.approx(np.diag(np.linalg.inv(root @ root.T)))

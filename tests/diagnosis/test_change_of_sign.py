@@ -7,15 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from pipelines.diagnosis.dataset import load
 from pipelines.dynamics.body import Motion
-from pipelines.effects.friction import Coulomb
-from pipelines.estimation.estimate import Recipe
-from pipelines.estimation.preparation import Logs, prepare
 from pipelines.io.log import Array, ExperimentLog
 from tests.diagnose.sessions import but
 from tests.diagnosis.arms import hidden
-from tests.diagnosis.asking import before, causes, diagnosed, effects
+from tests.diagnosis.asking import causes, diagnosed, effects
 from tests.healthy import begun
 from tests.model.estimation.experiments import COULOMB
 
@@ -67,40 +63,9 @@ def test_an_arm_whose_friction_changes_its_sign_by_another_curve_has_no_fault(
 
 
 @pytest.mark.slow
-def test_a_curve_that_was_there_before_is_no_change() -> None:
-    """Other motion shows more of it than the reference logs did."""
-    reference = before(hidden(4, changing_by(arc_tangent)), hidden(5, changing_by(arc_tangent)))
-    assert diagnosed(*reference, *session(arc_tangent)).decision.verdict == "no-fault-found"
-
-
-@pytest.mark.slow
 def test_concave_friction_is_still_found_beside_it() -> None:
     """A fifth of the dry friction levels off over 0.3 rad/s, thirty times the speed over which the rest changes its sign; how fast
     is told to two fifths, for a gradual change of sign passes for a part of it."""
     found = diagnosed(*session(lambda x: 0.8 * root(x) + 0.2 * np.tanh(x / 30.0)))
     assert causes(found)[0][0] == "concave_friction"
     assert effects(found)[0].values["speed"] == pytest.approx(0.3, rel=0.4)
-
-
-@pytest.mark.parametrize(("roundness", "curve"), [(2.0, root), (3.0, arc_tangent)])
-def test_root_and_arc_tangent_are_met_by_their_sigmoids(roundness: float, curve: Curve) -> None:
-    """Within an eighth of a per cent of the level at any speed."""
-    v = np.concatenate([np.linspace(0.0, 0.1, 2001), np.geomspace(0.1, 10.0, 2001)])
-    made = Coulomb(1).speed_curve({"level": 1.0, "sharpness": 100.0, "roundness": roundness})
-    np.testing.assert_allclose(made.torque(v), curve(100.0 * v), atol=1.25e-3)
-
-
-@pytest.mark.parametrize(
-    ("slowest", "reference", "free"),
-    [
-        (0.0, (), ("sharpness", "roundness")),
-        (0.05, (), ("sharpness",)),  # the change of sign is not among the equations then
-        (0.0, before(hidden(2)), ("sharpness", "roundness")),  # effects act on the friction as it is
-    ],
-)
-def test_the_curve_is_fitted_where_the_change_of_sign_is_among_the_rows(
-    slowest: float, reference: tuple[ExperimentLog, ...], free: tuple[str, ...]
-) -> None:
-    logs = Logs((hidden(1),), reference=reference)
-    laws = load(prepare(logs, Recipe(min_speed=(slowest,)))).model.columns.laws
-    assert [law.free for law in laws if isinstance(law, Coulomb)] == [free] * 3

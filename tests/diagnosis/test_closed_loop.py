@@ -9,40 +9,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from benchmarks.hidden_effects.cases import campaign
-from benchmarks.hidden_effects.make import make_cases
 from benchmarks.other_plants.drawn import drawn, pairs
 from pipelines import diagnose
-from pipelines.estimation.estimate import Recipe, motions_of, with_cutoff
-from pipelines.estimation.motion import Reconstruction
-from pipelines.estimation.regression import wanted_cutoff
-from pipelines.io.files import open_log, write_log
-from pipelines.io.log import ExperimentLog
+from pipelines.io.files import write_log
 from pipelines.io.results import encode
 from pipelines.stage import Request
-from tests.diagnosis.arms import hidden
 from tests.diagnosis.asking import causes, diagnosed, effects
-
-
-def pair(seed: int, key: str, folder: Path) -> list[ExperimentLog]:
-    """The logs of two causes that the bench hides together."""
-    list(make_cases([case for case in campaign(seed, ["pairs"]) if case.key == key], folder))
-    return [open_log(path).log for path in sorted((folder / "logs" / key).rglob("*.h5"))]
-
-
-@pytest.mark.parametrize(("orders", "lowest", "highest", "band"), [
-    (100, 0.0, np.inf, "ripple"), (100, 0.0, 25.0, "highest"), (0, 40.0, np.inf, "lowest"), (0, 0.0, np.inf, "motion")])
-def test_the_band_of_rows_is_that_of_motion_and_ripple(orders: int, lowest: float, highest: float, band: str) -> None:
-    """100 periods a turn at ω rad/s are 100 ω / 2π Hz."""
-    recipe = Recipe(orders=orders, lowest_hz=lowest, highest_hz=highest)
-    motions = motions_of([hidden(1)], Reconstruction())
-    log, found = motions[0]
-    wanted = {"ripple": 100.0 * np.abs(found.motion.dq).max() / (2.0 * np.pi), "highest": 25.0, "lowest": 40.0,
-              "motion": wanted_cutoff(found.motion, 1.0 / log.sample_time)}
-    assert with_cutoff(recipe, motions).cutoff_hz == pytest.approx(wanted[band])
 
 
 @pytest.mark.slow
@@ -109,37 +83,6 @@ def test_a_torque_that_hops_is_no_delay_and_no_contact(seed: int, number: int) -
 
 
 @pytest.mark.slow
-def test_no_law_of_friction_stands_beside_friction_of_another_joint() -> None:
-    """A healthy joint 1 got "concave friction" beside the position-dependent friction of joint 6."""
-    assert causes(diagnosed(*drawn(6, 31)[-1].logs())) == [("position_friction", 6)]
-
-
-@pytest.mark.slow
-def test_both_of_two_causes_are_found_where_a_soft_base_would_predict_one_of_them_better(tmp_path: Path) -> None:
-    """Without frequency responses a base has no name; it explained the lag of joint 2, and the gain of joint 3 stayed unnamed."""
-    found = diagnosed(*pair(41, "65a9417a5b", tmp_path))
-    assert sorted(causes(found)) == [("torque_gain", 3), ("torque_lag", 2)]
-    gain, lag = sorted(effects(found), key=lambda one: one.effect.name)
-    assert gain.values["gain_error"] == pytest.approx(-0.03, abs=0.003)
-    assert lag.values["time_constant"] == pytest.approx(1.5e-3, rel=0.1)
-
-
-@pytest.mark.slow
-def test_a_push_in_each_of_five_logs_leaves_room_for_a_cause(tmp_path: Path) -> None:
-    """Four of the five used up the largest number of causes."""
-    found = diagnosed(*pair(63, "ef91ec1374", tmp_path))
-    assert causes(found) == [("contact", None)] * 5 + [("torque_offset", 3)]
-    assert effects(found)[-1].values["offset"] == pytest.approx(0.03, rel=0.05)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("number", [3, 13])
-def test_the_slack_of_precise_gears_is_no_fault(number: int) -> None:
-    """103 and 15 µrad of backlash were named in healthy arms whose friction has another law; both have reference logs."""
-    assert causes(diagnosed(*drawn(number, 41)[-1].logs())) == []
-
-
-@pytest.mark.slow
 def test_a_joint_that_loses_seven_tenths_of_its_viscous_friction_is_no_unknown() -> None:
     """Of a gantry's first axis the fit stopped on the way: it took the friction for known while it fitted the drift."""
     found = diagnosed(*drawn(25, 33)[-1].logs())
@@ -153,25 +96,6 @@ def test_a_drift_is_a_share_of_all_the_viscous_friction() -> None:
     found = diagnosed(*drawn(43, 42)[-1].logs())
     assert causes(found) == [("viscous_drift", 3)]
     assert effects(found)[0].values["relative_change"] == pytest.approx(-0.725, abs=0.01)
-
-
-@pytest.mark.slow
-def test_no_link_mends_what_a_law_of_friction_leaves() -> None:
-    """A link .4 mm longer saved at joint 2 less than its load friction is inexact, and made joint 1 worse."""
-    assert causes(diagnosed(*drawn(6, 44)[-1].logs())) == [("load_friction", 2)]
-
-
-@pytest.mark.slow
-def test_no_record_is_ahead_of_its_drive() -> None:
-    """A drive that is 5.9 ms late was one of 3.1 ms, and its log 3.1 ms early, which no log is."""
-    found = diagnosed(*drawn(13, 46)[-1].logs())
-    assert causes(found) == [("drive_lag", 1)]
-
-
-@pytest.mark.slow
-def test_a_lag_is_no_lag_of_another_length() -> None:
-    """A fifth of the columns of a lag of 10 ms explained what a loop with coarse encoders does; it is no lag of 2 ms."""
-    assert causes(diagnosed(*drawn(10, 45)[-1].logs())) == []
 
 
 @pytest.mark.slow

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -48,18 +46,6 @@ def test_a_fit_ends_at_the_same_numbers_wherever_it_starts(
     assert one.model.effects[0].effect.order == pytest.approx(
         other.model.effects[0].effect.order, abs=1e-3
     )
-
-
-def test_the_shape_of_a_law_is_fitted_where_the_form_of_friction_is_not_free(later: Later) -> None:
-    """Without reference logs the form is free, and a shape would say nothing beside it."""
-    effect = Cogging(2, order=11.0, harmonics=1)
-    model = later.start().model.with_effect(effect, np.array([0.1, 0.0]))
-    free = {kind for kind, _, _ in later.slopes(model)[1]}
-    n = len(later.prior.scale)
-    alone = replace(later, prior=later.prior.nominal(np.eye(n), np.zeros(n)))
-    fitted = {kind for kind, _, _ in alone.slopes(model)[1]}
-    assert free == {1}  # of effects alone
-    assert fitted == {0, 1}
 
 
 def test_no_number_is_surer_than_it_moves_with_what_healthy_joints_have_in_small(

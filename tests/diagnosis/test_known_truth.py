@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pipelines import diagnose
 from pipelines.dynamics.body import Motion
-from pipelines.effects import find_effect
 from pipelines.estimation.preparation import Logs
-from pipelines.io.files import open_log
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.stage import Request
-from tests.diagnose.sessions import but, session, written
+from tests.diagnose.sessions import but
 from tests.diagnosis.arms import arm, hidden, wave
 from tests.diagnosis.asking import answered, causes, diagnosed, effects
 from tests.diagnosis.rotor import turned
-from tests.faulty import dropped
 from tests.healthy import begun, with_signal
 from tests.model.estimation.experiments import VISCOUS
 
@@ -95,24 +89,6 @@ def test_what_is_surely_named_is_named_beside_a_larger_torque_without_a_name() -
     assert "joint 1" in found.decision.reason
 
 
-def both(motion: Motion) -> Array:
-    """Cogging at joint 2 and a drag at joint 1."""
-    out = wave(motion).copy()
-    out[:, 0] += 0.3 * motion.dq[:, 0] * np.abs(motion.dq[:, 0])
-    return out
-
-
-@pytest.mark.slow
-def test_the_largest_number_of_causes_hides_none(tmp_path: Path) -> None:
-    """Of two causes one is named, and the result says that the search ended before the other."""
-    folder = written(tmp_path, short(both))
-    settings = diagnose.Settings(exclude=but("cogging", "quadratic_drag"), max_causes=1, skip_sanity_checks=True)
-    found = diagnose.compute(diagnose.read(Request((folder,)), settings), settings, whole=False)
-    assert [(one.cause, one.joint) for one in found.findings] == [("quadratic_drag", 1)]
-    for said in (found.reason, found.summary):
-        assert "he search ended at 1 cause (--max-causes 1); still significant: cogging:2" in said
-
-
 @pytest.mark.slow
 def test_a_delay_is_fitted_exactly() -> None:
     """Position 3 ms late at joint 3: to first order the torque is a slope, exactly it is another moment."""
@@ -126,24 +102,6 @@ def test_a_delay_is_fitted_exactly() -> None:
     found = diagnosed(*map(delayed, logs()), exclude=but(*FEW))
     assert causes(found) == [("time_delay", 3)]
     assert effects(found)[0].values["delay"] == pytest.approx(0.003, abs=5e-5)
-
-
-@pytest.mark.slow
-def test_a_drift_that_is_seen_only_at_its_beginning_has_numbers_that_can_be() -> None:
-    """12 mN m s/rad less every second, straight: no end of it is in the logs."""
-
-    def less(motion: Motion) -> Array:
-        out = np.zeros_like(motion.q)
-        out[:, 1] = -0.012 * (motion.t - motion.t[0]) * motion.dq[:, 1]
-        return out
-
-    found = diagnosed(*logs(less), exclude=but(*FEW, "viscous_drift"))
-    assert causes(found) == [("viscous_drift", 2)]
-    model = found.look.selection.end.model
-    values, end = effects(found)[0].values, 8.0
-    friction = find_effect("viscous_drift")(joint=2)._viscous(model.nominal)
-    gone = -values["relative_change"] * -np.expm1(-end / values["time_constant"]) * friction
-    assert gone == pytest.approx(0.012 * end, rel=0.15)
 
 
 def pushed(motion: Motion) -> Array:
@@ -198,14 +156,6 @@ def test_a_drive_that_hunts_is_unknown() -> None:
     assert (found.verdict, found.causes) == ("unknown", ())
 
 
-@pytest.mark.slow
-def test_every_joint_of_three_sigmoids_has_its_hump(samples: Path) -> None:
-    """By Coulomb and viscous friction, which have no hump at low speed."""
-    names = ("excitation-1", "free-1", "excitation-2")
-    found = diagnosed(*(open_log(samples / f"rrr-closed-form/{name}.h5").log for name in names))
-    assert set(causes(found)) == {("stribeck", joint) for joint in (1, 2, 3)}
-
-
 def rotor(waves: dict[float, float], mean: float = 0.65) -> list[float]:
     """Return the first orders that are found of a rotor with these amplitudes [N m] of each order."""
     few = but("cogging", "spring", "torque_offset")
@@ -251,28 +201,3 @@ def test_a_ripple_is_found_beside_it() -> None:
     assert causes(found) == [("cogging", 1)]
     assert effects(found)[0].values["order"] == pytest.approx(7.0, rel=0.01)
     assert effects(found)[0].values["amplitude"] == pytest.approx(0.014, rel=0.25)
-
-
-@pytest.mark.slow
-def test_a_ripple_that_is_there_for_half_a_log_is_none_of_the_machine() -> None:
-    """Parts of the log do not agree on its size."""
-    whole, without = turned(1, {7.0: 0.04}, 0.0), turned(1, {}, 0.0)
-    first = (np.arange(whole.n_samples) < 0.5 * whole.n_samples)[:, None]
-    half = with_signal(whole, tau=np.where(first, whole.tau, without.tau))
-    assert ("cogging", 1) not in causes(diagnosed(half, exclude=but("cogging"), cutoff_hz=40.0))
-
-
-def test_samples_lost_here_and_there_are_no_fault() -> None:
-    fitted, judging = session()
-    found = diagnosed(dropped(fitted, lambda k: k % 97 != 96), judging, exclude=but(*FEW))
-    assert found.decision.verdict == "no-fault-found"
-
-
-def test_how_fast_a_drift_is_goes_by_the_logs_and_not_by_the_time_between_them() -> None:
-    """Two logs of eight seconds, five minutes apart: from a fifth to five times eight seconds."""
-    later = with_signal(hidden(2), t=hidden(2).t + 300.0)
-    found = diagnosed(hidden(1), later, exclude=but("viscous_drift"))
-    families = found.look.later.dictionary.families
-    for joint in (1, 2, 3):
-        times = [shape.time_constant for shape in families["viscous_drift", joint].shapes]
-        assert times == pytest.approx([1.6, 4.0, 12.0, 40.0], rel=1e-3)

@@ -12,11 +12,8 @@ from bench.draw import draw_machine
 from bench.faults import make
 from bench.machine import Fault, Machine
 from bench.plant import record
-from pipelines.diagnosis.limits import without_limit
-from pipelines.diagnosis.result import DetectionLimit, Diagnosis, Rejected
-from pipelines.dynamics.arm import Acting
+from pipelines.diagnosis.result import DetectionLimit, Diagnosis
 from pipelines.effects import effect_names
-from pipelines.effects.friction import TwoSigmoid
 from pipelines.estimation.preparation import Logs
 from pipelines.io.log import ExperimentLog
 from tests.diagnose.sessions import but
@@ -117,55 +114,3 @@ def test_nothing_of_the_library_goes_unsaid() -> None:
     lists = (found.findings, found.baseline_effects, found.detection_limits, found.not_identifiable)
     every = {one.cause for some in (*lists, found.without_limit) for one in some}
     assert every == set(effect_names()) - set(FEW) - {"two_sigmoid"}
-
-
-def test_a_law_that_only_stands_in_for_another_is_said_where_the_model_has_it() -> None:
-    """Nobody is told that fit-friction chooses two sigmoids: it does not know them."""
-    found = healthy(FEW)
-    assert found.nominal is not None
-    assert "two_sigmoid" not in {one.cause for one in without_limit(found, False)}
-    two = Acting.of(TwoSigmoid(1), {"f1": 1.0, "f2": 0.1, "w1": 60.0, "w2": 12.0, "b": 0.1})
-    told = replace(found, nominal=replace(found.nominal, friction=(two, *found.nominal.friction)))
-    said = next(one.reason for one in without_limit(told, False) if one.cause == "two_sigmoid")
-    assert "part of the nominal model" in said
-
-
-@pytest.mark.parametrize(
-    ("cause", "frf", "refused", "said"),
-    [
-        ("coulomb", False, "", "part of the nominal model"),
-        ("three_sigmoid", False, "", "another law of friction"),
-        ("joint_elasticity", True, "", "frequency responses show none"),
-        ("joint_elasticity", False, "", "was looked for"),
-        ("payload", False, "", "not found to have moved"),
-        ("cogging", False, "", "was looked for"),
-        (
-            "payload",
-            False,
-            "the base parameters have moved as link_length or payload moves them",
-            "have moved as link_length",
-        ),
-    ],
-)
-def test_what_has_no_limit_is_said_as_it_was_seen(
-    cause: str, frf: bool, refused: str, said: str
-) -> None:
-    """A law of the model, a spring that responses deny, what did not move; what was refused, by the words it was refused with."""
-    rejected = (Rejected(cause, None, refused),) if refused else ()
-    nothing = replace(
-        healthy(FEW),
-        rejected=rejected,
-        findings=(),
-        baseline_effects=(),
-        detection_limits=(),
-        not_identifiable=(),
-    )
-    (reason,) = (one.reason for one in without_limit(nothing, frf) if one.cause == cause)
-    assert said in reason
-
-
-def test_a_cogging_limit_says_at_which_order() -> None:
-    there = limit("cogging", 2)
-    assert set(there.at) == {"order"}
-    assert there.minimum.unit == "N m"
-    assert 0.0 < there.identifiability <= 1.0

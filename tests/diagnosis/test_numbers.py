@@ -10,10 +10,8 @@ import pytest
 from pipelines.diagnosis.trained import parameters, told
 from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Motion
-from pipelines.effects.angle import Cogging
 from pipelines.effects.base import Effect
-from pipelines.effects.bodies import GravityTilt, Payload, TransmissionCoupling
-from pipelines.effects.friction import TorqueOffset
+from pipelines.effects.bodies import GravityTilt, TransmissionCoupling
 from pipelines.estimation.estimate import Recipe
 from pipelines.estimation.exact_model import Exact, Named
 from pipelines.estimation.model_fit import Refined, _by_slopes, acting, refine
@@ -80,33 +78,3 @@ def test_a_tilt_is_as_sure_as_its_two_components(x: float, y: float, std: float)
     amplitudes, covariance = np.array([x, y, 8.0, -3.0]), np.diag([std**2, std**2, 0.01, 0.01])
     assert spread(GravityTilt(), amplitudes, covariance, "angle") == pytest.approx(std, rel=0.01)
     assert spread(GravityTilt(), amplitudes, covariance, "direction") == pytest.approx(std / np.hypot(x, y), rel=0.01)
-
-
-@pytest.mark.parametrize("together", [-0.99, 0.0, 0.99])
-def test_errors_that_go_together_add_up_as_they_do(together: float) -> None:
-    """Sine and cosine part of a wave a and a, each known to σ, correlated by r: its amplitude is known to σ √(1 + r), its phase to
-    σ √(1 - r)/(a √2)."""
-    a, std = 0.3, 0.01
-    covariance = std**2 * np.array([[1.0, together], [together, 1.0]])
-    wave, amplitudes = Cogging(2, harmonics=1), np.array([a, a])
-    assert spread(wave, amplitudes, covariance, "amplitude") == pytest.approx(std * np.sqrt(1.0 + together), rel=1e-3)
-    turned = std * np.sqrt(1.0 - together) / (a * np.sqrt(2.0))
-    assert spread(wave, amplitudes, covariance, "phase") == pytest.approx(turned, rel=1e-3)
-
-
-def test_what_was_not_fitted_or_not_seen_has_no_deviation() -> None:
-    """A wave's order is that of its shape; of harmonics that it lacks, and of amplitudes of no variance, nobody knows anything."""
-    found = told(of_amplitudes(Cogging(2, harmonics=1), np.array([0.3, 0.1]), 1e-4 * np.eye(2), (True,) * 3))
-    assert {name for name, one in found.items() if one.std is not None} == {"amplitude", "phase"}
-    found = told(of_amplitudes(GravityTilt(), np.array([0.02, 0.01, 0.0, 0.0]), np.diag([1e-6, 1e-6, 0.0, 0.0]), (True,) * 3))
-    assert {name for name, one in found.items() if one.std is not None} == {"angle", "direction"}
-    load = told(of_amplitudes(Payload(), np.arange(1.0, 11.0), np.diag([0.01, 0.04, 0.0, 0.09, *[1.0] * 6]), (True,) * 3))
-    assert load["first_moment"].value == (2.0, 3.0, 4.0)
-    assert load["first_moment"].std == pytest.approx((0.2, np.inf, 0.3))
-
-
-def test_an_offset_at_a_slide_is_a_force() -> None:
-    arms = {kind: told(of_amplitudes(TorqueOffset(2), np.array([0.5]), np.array([[1e-4]]), (True, kind, True)))["offset"]
-            for kind in (True, False)}
-    assert {kind: one.unit for kind, one in arms.items()} == {True: "N m", False: "N"}
-    assert arms[False].std == pytest.approx(0.01)

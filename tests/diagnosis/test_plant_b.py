@@ -69,27 +69,6 @@ def test_friction_that_stood_before_may_drift_as_friction_does(shared: Path) -> 
     assert _healthy_with(shared, asymmetric).decision.verdict == "no-fault-found"
 
 
-@pytest.mark.slow
-def test_bursts_at_all_times_are_no_push(shared: Path) -> None:
-    def bursts(log: ExperimentLog) -> np.ndarray:
-        out = np.zeros_like(log.tau)
-        if log.role != "reference":
-            for middle in np.arange(log.t[0] + 0.7, log.t[-1], 0.7):
-                out[:, 1] += np.exp(-(((log.t - middle) / 0.05) ** 2)) * np.sin(7.0 * middle)
-        return out
-
-    found = _healthy_with(shared, bursts).decision
-    assert "contact" not in {cause.key[0] for cause in found.causes}
-
-
-@pytest.mark.slow
-def test_a_verdict_does_not_depend_on_what_was_asked_before(shared: Path) -> None:
-    first, _ = _found(shared, "12")
-    _found(shared, "08")
-    again, _ = _found(shared, "12")
-    assert again.decision == first.decision
-
-
 def test_a_joint_that_the_reference_never_moves_is_refused(shared: Path) -> None:
     logs = [open_log(path).log for path in sorted((shared / "plant-b/arm-14").glob("*.h5"))]
     held = [

@@ -39,26 +39,6 @@ def test_noise_beside_a_wrong_model(twice: Data, size: float) -> None:
     assert np.mean(common - differing) == pytest.approx(size**2, rel=0.2, abs=1e-4)
 
 
-def test_no_row_is_in_two_pairs_and_none_beside_its_partner(twice: Data) -> None:
-    pairs = Repeated.of(twice)
-    every = np.concatenate([pairs.first, pairs.second])
-    assert len(np.unique(every)) == len(every)
-    time = np.concatenate([one.t for one in twice.logs])
-    log = np.repeat([0, 1], [one.rows for one in twice.logs])
-    apart = np.abs(time[pairs.first] - time[pairs.second]) > 0.99
-    assert (apart | (log[pairs.first] != log[pairs.second])).all()
-
-
 def test_where_nothing_comes_again_nobody_knows_the_noise() -> None:
     data = prepare(Logs((hidden(1), hidden(2))), Recipe()).data
     assert np.isnan(Repeated.of(data).noise(np.ones(data.rows))).all()
-
-
-def test_rows_that_do_not_count_are_not_asked(twice: Data) -> None:
-    first, second = twice.logs
-    weighed = first.weighed.copy()
-    weighed[0, 200:260] = False
-    data = replace(twice, logs=(replace(first, weighed=weighed), second))
-    left = np.random.default_rng(2).normal(size=data.rows) * NOISE
-    left[200:260] = 40.0
-    assert Repeated.of(data).noise(left)[0] == pytest.approx(NOISE**2, rel=0.2)

@@ -11,7 +11,7 @@ import pytest
 from bench.draw import draw_machine
 from bench.faults import make
 from pipelines.diagnosis import engine, extension
-from pipelines.diagnosis.compliance import Compliance, new_causes
+from pipelines.diagnosis.compliance import Compliance
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.effects.soft import BaseResonance
 from pipelines.estimation.candidate_columns import Wanted
@@ -42,22 +42,6 @@ def told(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("told")
-def test_a_soft_base_is_worth_something_on_held_out_logs_and_enters_the_model() -> None:
-    fitted, judging = session("base_resonance", None)
-    found = answered(Logs((fitted,), (judging,), (), (fitted,)), exclude=FEW, whole=True)
-    assert [(one.cause, one.origin) for one in found.findings] == [("base_resonance", "frequency responses")]
-    gain = found.findings[0].gain
-    assert gain.validate_torque_rms.ci95[0, 1] < 0.0
-    assert gain.validate_torque_rms.after[0] < 0.5 * gain.validate_torque_rms.before[0]
-    assert gain.simulated_position_rms is not None
-    assert gain.simulated_position_rms.after[0] < gain.simulated_position_rms.before[0]
-    assert found.extended is not None
-    assert [one.place for one in found.extended.effects] == ["base_resonance"]
-    assert found.after_rms.validate[0] == pytest.approx(gain.validate_torque_rms.after[0], rel=1e-6)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("told")
 def test_what_responses_name_has_to_win_on_the_rows_as_well() -> None:
     """Responses name a soft base where motion shows a firm one: it is no finding, and the ledger says why."""
     fitted, judging = session(seed=3)
@@ -77,11 +61,3 @@ def test_the_extension_takes_the_responses_numbers() -> None:
     assert found.arm is not None
     assert found.arm.effects[0].values["frequency"] == pytest.approx(base().values["frequency"], rel=0.06)
     assert np.all(found.after.validate <= 1.05 * found.before.validate)
-
-
-def test_a_base_that_was_always_soft_is_no_news_by_its_responses() -> None:
-    """28 Hz again, by a hair; 28 and now 25 Hz; firm and now soft."""
-    now, again, other = base(28.0, 1e-3), base(28.01, 1e-3), base(25.0, 1e-3)
-    assert new_causes(Compliance((now,), ""), Compliance((again,), "")) == ()
-    assert new_causes(Compliance((other,), ""), Compliance((again,), "")) == (other,)
-    assert new_causes(Compliance((now,), ""), Compliance((), "")) == (now,)

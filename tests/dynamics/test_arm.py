@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from pipelines.dynamics.arm import Acting, Arm
-from pipelines.dynamics.body import Array, Motion
-from pipelines.dynamics.parameter import Parameter
-from pipelines.effects.angle import Cogging
-from pipelines.effects.base import (
-    ArmModel,
-    Effect,
-    Parameters,
-    Predict,
-    Quantity,
-    Words,
-)
+from pipelines.dynamics.body import Motion
 from pipelines.effects.friction import Viscous
 from pipelines.errors import InputRejected, UsageError
 from pipelines.io.model_file import (
@@ -31,7 +20,6 @@ from pipelines.io.model_file import (
     model_text,
     parse_model,
 )
-from pipelines.io.robot import Joint, LinkParameters, RobotDescription
 from pipelines.io.robot_files import load_robot
 from sample_logs.make_model import synthetic_arm
 from tests.dynamics.rrr_arms import column, random_states
@@ -45,23 +33,6 @@ def arm() -> Arm:
 @pytest.fixture(scope="module")
 def motion() -> Motion:
     return Motion(np.linspace(0.0, 0.199, 200), *random_states(np.random.default_rng(1), 200))
-
-
-@dataclass(frozen=True)
-class HalfTorque(Effect):
-    """τ = τ_before / 2: not a sum, so the order of effects shows."""
-
-    name = "half_torque"
-    scope = "arm"
-    parameters: ClassVar[Parameters] = Parameters(Quantity("part", "1", 0.0, 1.0, "part that is left"))
-    words = Words("Half the torque", *["For tests."] * 4)
-
-    def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        return arm.torque(motion)[..., None]
-
-    def apply(self, motion: Motion, arm: ArmModel, values: Mapping[str, float],
-              predict: Predict | None = None) -> Array:
-        return values["part"] * (predict or (lambda m, a: a.torque(m)))(motion, arm)
 
 
 def test_torque_of_the_synthetic_arm(arm: Arm, vectors: dict[str, Any]) -> None:
@@ -83,54 +54,6 @@ def test_the_parts_sum_to_the_torque(arm: Arm, motion: Motion) -> None:
     np.testing.assert_allclose(parts.effects[:, 1], 0.4 * motion.dq[:, 1], rtol=1e-9, atol=1e-12)
     assert not arm.torque_parts(motion).effects.any()
     assert np.abs(parts.friction).max() > 1.0
-
-
-def test_effects_act_around_those_before(arm: Arm, motion: Motion) -> None:
-    """Half of everything, then drag; drag, then half of everything."""
-    half, drag = Acting.of(HalfTorque(), {"part": 0.5}), Acting.of(Viscous(3), {"coefficient": 1.0})
-    rest, own = arm.torque(motion), np.array([0.0, 0.0, 1.0]) * motion.dq
-    np.testing.assert_allclose(arm.extended(half, drag).torque(motion), 0.5 * rest + own, rtol=1e-12)
-    np.testing.assert_allclose(arm.extended(drag, half).torque(motion), 0.5 * (rest + own), rtol=1e-12)
-    assert arm.extended(half, drag).nominal == arm
-
-
-def test_what_is_kept_of_a_motion_is_that_of_the_very_arm(arm: Arm, motion: Motion, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of one that nobody writes to, torque is worked out once: for another arm anew, and whoever writes to it writes to a copy."""
-    still = replace(motion, q=motion.q.copy(), dq=motion.dq.copy(), ddq=motion.ddq.copy())
-    for x in (still.q, still.dq, still.ddq):
-        x.flags.writeable = False
-    heavier = replace(arm, base=tuple(replace(p, value=1.1 * p.value) for p in arm.base))
-    smoother = replace(arm, friction=arm.friction[:1])
-    arms = (arm.nominal, heavier.nominal, smoother.nominal, arm, heavier)
-    asked, worked = list[int](), type(arm.body).torque
-    monkeypatch.setattr(type(arm.body), "torque", lambda body, q, *rest: asked.append(id(q)) or worked(body, q, *rest))
-    for one in (*arms, *reversed(arms)):
-        torque = one.torque(still)
-        np.testing.assert_allclose(torque, one.torque(motion), rtol=0, atol=1e-12)
-        np.testing.assert_allclose(one.friction_torque(still), one.friction_torque(motion), rtol=0, atol=1e-12)
-        torque += 1.0
-    assert asked.count(id(still.q)) == 3
-    half = arm.nominal.extended(Acting(HalfTorque(), (Parameter("part", 0.5, None, "1"),)))
-    inside = half.torque(still, lambda there, own: own.torque(there) + 1.0)
-    np.testing.assert_allclose(inside, half.torque(motion) + 0.5, rtol=0, atol=1e-12)  # it acts on what stands inside too
-
-
-def test_every_number_has_an_address(arm: Arm) -> None:
-    """Base parameters by name, the rest by place and name, as the command line writes them."""
-    numbers = arm.extended(Acting.of(Viscous(2), {"coefficient": 0.4}, {"coefficient": 0.01})).parameters
-    assert numbers["p3"].value == pytest.approx(0.17306)
-    assert numbers["p3"].origin == "known"
-    assert numbers["three_sigmoid:1:b"].value == 0.6
-    assert numbers["viscous:2:coefficient"] == Parameter("coefficient", 0.4, 0.01, "N m s/rad", (0.0, 1e5))
-    assert len(numbers) == 15 + 3 * 7 + 1
-
-
-def test_another_body_keeps_the_friction(arm: Arm, motion: Motion) -> None:
-    """An effect may hand on the arm with another geometry."""
-    heavier = arm.with_body(arm.body, 1.1 * arm.p)
-    rigid = arm.torque(motion) - arm.friction_torque(motion)
-    np.testing.assert_allclose(heavier.torque(motion), arm.torque(motion) + 0.1 * rigid, rtol=1e-9, atol=1e-9)
-    assert {parameter.origin for parameter in heavier.base} == {"assumed"}
 
 
 def test_any_serial_arm_is_modelled_alike(motion: Motion) -> None:
@@ -207,42 +130,3 @@ def test_a_file_from_before_a_number_was_known_keeps_its_law(arm: Arm, motion: M
     there = Motion(np.arange(500) * 1e-2, q, dq, np.zeros_like(q))
     more = back.torque(there) - replace(back, effects=()).torque(there)
     np.testing.assert_allclose(more[300:, 1], -1.5 * (1.0 - 2.0 * np.exp(-(0.3 - q[300:, 1]) / 0.01)), atol=1e-6)
-
-
-def test_units_follow_the_kind_of_joint() -> None:
-    """A prismatic joint has N where a revolute one has N m."""
-    assert Quantity("b", "N m s/rad", 0, 1, "").unit_at(revolute=False) == "N s/m"
-    assert Quantity("b", "N m s/rad", 0, 1, "").unit_at(revolute=True) == "N m s/rad"
-    assert Quantity("J", "kg m^2", 0, 1, "").unit_at(revolute=False) == "kg"
-    assert Quantity("k", "1/rev", 0, 1, "").unit_at(revolute=False) == "1/(2 pi m)"
-    assert Quantity("x", "rad", 0, 1, "").unit_at(revolute=False) == "m"
-
-
-def test_a_wave_along_a_slide_has_its_phase_in_rad() -> None:
-    """Its amplitude is a force and its waves are counted in 2π metres; where in a wave one is, is no length."""
-    units = {p.name: p.unit for p in Acting.of(Cogging(2), dict.fromkeys((q.name for q in Cogging.parameters), 1.0),
-                                               revolute=False).parameters}
-    assert {units[f"phase{tail}"] for tail in ("", "_2", "_3")} == {"rad"}
-    assert (units["amplitude"], units["order"], units["order_2"]) == ("N", "1/(2 pi m)", "1/(2 pi m)")
-
-
-def test_a_model_with_an_eccentric_encoder_at_a_slide_is_refused() -> None:
-    """Its error goes once a turn, and a slide has none."""
-    rail = RobotDescription("rail", (0.0, 0.0, -9.81), "dh", (Joint("rail", "prismatic"),))
-    arm = Arm.from_links(replace(rail, joints=(replace(rail.joints[0], link=LinkParameters(1.0, (0.0,) * 3, (0.0,) * 6)),)))
-    stored = StoredEffect("encoder_eccentricity", 1, {"amplitude": StoredValue(1e-3, None, "m", "fitted"),
-                                                      "phase": StoredValue(0.0, None, "rad", "fitted")})
-    with pytest.raises(InputRejected, match="cannot be at joint 1"):
-        Arm.from_model(replace(arm.to_model(), effects=(stored,)))
-
-
-def test_a_prismatic_joint_is_told_from_a_turning_one() -> None:
-    assert Joint("rail", "prismatic").revolute is False
-
-
-@pytest.mark.parametrize(("parameter", "words"), [
-    (Parameter("m", 1.93, 0.021, "kg"), "1.930 ± 0.021 kg"), (Parameter("k", 123.4, 25.0), "123 ± 25"),
-    (Parameter("g", 9.8062, None, "m/s^2"), "9.8062 m/s^2")])
-def test_a_number_in_words(parameter: Parameter, words: str) -> None:
-    """As many digits as the uncertainty leaves."""
-    assert parameter.words == words

@@ -14,11 +14,10 @@ from pipelines.dynamics import chain as serial
 from pipelines.dynamics import rrr
 from pipelines.dynamics.base_parameters import BaseArm, base_set
 from pipelines.dynamics.kinematics import serial_chain
-from pipelines.dynamics.rrr import rigid_body
 from pipelines.io.robot import LinkParameters, RobotDescription
 from pipelines.io.robot_files import load_robot
 from pipelines.io.urdf import import_urdf
-from tests.dynamics.serial_arms import HALF, TX40, Arm, physical_links, table
+from tests.dynamics.serial_arms import TX40, Arm, physical_links
 
 
 def _pinocchio_rank(arm: Arm) -> tuple[int, float]:
@@ -109,21 +108,6 @@ def test_the_set_does_not_depend_on_the_draw(arm: Arm) -> None:
     assert [p.combination for p in first.parameters] == [p.combination for p in second.parameters]
 
 
-def test_words_do_not_hang_on_the_last_bit() -> None:
-    """Millimetres squared, and coefficients halfway between two roundings, are written the same for every draw."""
-    rows = [("revolute", HALF, 0.1505, 0.001, 0.0), ("revolute", -HALF, 0.001, 0.1505, 0.0),
-            ("revolute", HALF, 0.1505, 0.001, 0.0), ("prismatic", 0.0, 0.001, 0.0, 0.0)]
-    chain = serial_chain(table("mm", "dh", rows))
-    words = {tuple(p.combination for p in base_set(chain, np.random.default_rng(seed)).parameters) for seed in range(20)}
-    assert len(words) == 1
-
-
-def test_limits_do_not_change_the_set(arm: Arm) -> None:
-    """A joint that may move by a degree only has the base parameters of one that turns freely."""
-    tight = replace(arm.robot, joints=tuple(replace(j, position=(0.0, 0.02)) for j in arm.robot.joints))
-    assert BaseArm(tight).parameters == BaseArm(arm.robot).parameters
-
-
 def test_combinations_say_what_the_numbers_are(arm: Arm) -> None:
     """Read aloud, "Ixx2 - Iyy2 + 0.0506 m3" gives the value of the parameter for any links."""
     phi = physical_links(arm.n, np.random.default_rng(49))
@@ -135,35 +119,3 @@ def test_combinations_say_what_the_numbers_are(arm: Arm) -> None:
         read = sum((-1.0 if sign == "-" else 1.0) * float(size or 1.0)
                    * phi[10 * (int(link) - 1) + serial.STANDARD.index(name)] for sign, size, name, link in terms)
         assert value == pytest.approx(read, abs=2e-5 * np.abs(phi).max())
-
-
-def test_conventional_parameters_are_kept(shared: Path) -> None:
-    """With z along the joints, Ixx, Izz, Ixy, Ixz, Iyz, mx, my stand for the set (Gautier & Khalil 1990)."""
-    names = {p.name for p in BaseArm(import_urdf(shared / TX40)).parameters}
-    every = {f"{name}{link}" for link in range(2, 7) for name in ("Ixx", "Izz", "Ixy", "Ixz", "Iyz", "mx", "my")}
-    assert names == every | {"Izz1"}
-
-
-def test_units_follow_the_leading_parameter(arm: Arm) -> None:
-    """A mass is in kg, a first moment in kg m, an inertia in kg m^2."""
-    for parameter in BaseArm(arm.robot).parameters:
-        assert parameter.unit == {"m": "kg", "I": "kg m^2"}[parameter.name[0]] + (" m" if parameter.name[1] in "xyz"
-                                                                                 and parameter.name[0] == "m" else "")
-
-
-def test_unknown_links_have_no_parameters(shared: Path) -> None:
-    """One link the description does not know leaves all base parameters unknown, for they mix links."""
-    robot = load_robot("rrr")
-    half = replace(robot, joints=(replace(robot.joints[0], link=None), *robot.joints[1:]))
-    assert BaseArm(half).known_parameters() is None
-
-
-def test_an_arm_that_is_no_rrr_gets_the_general_recursion(shared: Path) -> None:
-    """The TX40 is served by the general recursion, and its tip is where Pinocchio has it."""
-    body = rigid_body(import_urdf(shared / TX40))
-    assert isinstance(body, BaseArm)
-    model = pin.buildModelFromUrdf(str(shared / TX40))
-    data, q = model.createData(), np.random.default_rng(51).normal(size=6)
-    pin.framesForwardKinematics(model, data, q)
-    theirs = data.oMf[model.getFrameId("tool0")].translation
-    np.testing.assert_allclose(body.tip(q[None])[0], theirs, atol=1e-14)

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from pipelines.dynamics import chain as serial
 from pipelines.dynamics.kinematics import serial_chain
-from pipelines.io.robot_files import load_robot
 from tests.dynamics.serial_arms import ARMS, HALF, Arm, by_hand, physical_links, table
 
 BAR = 1e-11  # of the largest torque
@@ -118,20 +117,3 @@ def test_a_joint_does_not_feel_the_links_before_it(arm: Arm) -> None:
     y = serial.regressor(serial_chain(arm.robot), *arm.states(10, seed=30))
     for j in range(1, arm.n):
         assert not y[:, j, :10 * j].any()
-
-
-def test_memory_given_is_written_all_over(arm: Arm) -> None:
-    """Whatever stood in `out` before, afterwards it is the regressor."""
-    chain = serial_chain(arm.robot)
-    motion, columns = arm.states(50, seed=33), [k for k in range(10 * arm.n) if k % 3]
-    out = np.full((arm.n, len(columns), 50), np.nan)
-    y = serial.regressor(chain, *motion, columns, out=out)
-    assert np.shares_memory(y, out)
-    np.testing.assert_array_equal(y, serial.regressor(chain, *motion, columns))
-
-
-@pytest.mark.parametrize("columns", [[3, 2], [1, 1], [-1], [30]])
-def test_columns_that_do_not_exist_or_are_out_of_order_are_refused(columns: list[int]) -> None:
-    """A wrong choice of columns is an error, never another column."""
-    with pytest.raises(ValueError, match="increasing"):
-        serial.regressor(serial_chain(load_robot("rrr")), *np.zeros((3, 2, 3)), columns)

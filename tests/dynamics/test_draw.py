@@ -37,13 +37,3 @@ def test_a_drawn_law_acts_with_its_numbers() -> None:
     motion = Motion(np.zeros(1), np.zeros((1, 3)), dq, np.zeros((1, 3)))
     np.testing.assert_allclose(other.torque(motion) - arm.torque(motion), [[0.0, 2.0 * off, 0.0]], atol=1e-12)
     assert abs(off) > 0.01
-
-
-def test_a_model_file_is_drawn_by_its_standard_deviations() -> None:
-    """Without a covariance base parameters are independent, and friction is held."""
-    arm = synthetic_arm()
-    told = replace(arm, base=tuple(replace(p, std=0.1) for p in arm.base), uncertainty=None)
-    rng = np.random.default_rng(5)
-    off = np.array([drawn(told, rng).p - arm.p for _ in range(300)])
-    np.testing.assert_allclose(off.std(axis=0), 0.1, rtol=0.2)
-    assert drawn(told, rng).friction == arm.friction

@@ -51,16 +51,6 @@ def test_rate_of_energy_is_power(arm: Arm) -> None:
     assert np.abs(slope - power).max() < 1e-8 * np.abs(power).max()
 
 
-def test_the_closed_form_is_the_general_one() -> None:
-    """The RRR arm's energy in closed form and by the chain differ by a constant."""
-    closed, general = bodies()
-    p = [body.known_parameters() for body in (closed, general)]
-    rng = np.random.default_rng(0)
-    q, dq = rng.uniform(-3, 3, (2, 200, 3))
-    difference = energy(closed, q, dq) @ p[0] - energy(general, q, dq) @ p[1]
-    assert np.ptp(difference) < 1e-12
-
-
 def test_work_done_is_energy_gained() -> None:
     """The work of the torque over a motion is the energy at its end less that at its start, for any part of it."""
     body = bodies()[0]

@@ -39,8 +39,3 @@ def test_jacobian_is_the_derivative_of_the_tip(arm: Arm) -> None:
     chain, h = serial_chain(arm.robot), 1e-6
     moved = (tip_position(chain, q + h * dq) - tip_position(chain, q - h * dq)) / (2.0 * h)
     np.testing.assert_allclose(np.einsum("sij,sj->si", jacobian(chain, q)[:, :3], dq), moved, atol=1e-7)
-
-
-def test_no_samples_give_no_frames(arm: Arm) -> None:
-    """An empty log has an empty path, not an error."""
-    assert tip_position(serial_chain(arm.robot), np.empty((0, arm.n))).shape == (0, 3)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import re
-
 import pytest
 
-from pipelines.dynamics.named_cause import acting_cause, wanted_cause
+from pipelines.dynamics.named_cause import acting_cause
 from pipelines.errors import UsageError
 
 REVOLUTE = (True, True, False)
@@ -20,11 +18,6 @@ def test_a_cause_with_its_numbers() -> None:
     found = acting_cause("coulomb:1:level=1, sharpness=50", REVOLUTE)
     assert found.values == {"level": 1.0, "sharpness": 50.0, "roundness": 1.0}
     assert {q.origin for q in found.parameters} == {"assumed"}
-
-
-def test_units_follow_the_kind_of_joint() -> None:
-    """A prismatic joint has N where a turning one has N m."""
-    assert acting_cause("coulomb:3:level=1", REVOLUTE).parameters[0].unit == "N"
 
 
 @pytest.mark.parametrize(("text", "code", "words"), [
@@ -69,45 +62,3 @@ def test_anything_else_is_refused(text: str, code: str, words: str) -> None:
         acting_cause(text, REVOLUTE)
     assert refused.value.code == f"RRID-{code}"
     assert refused.value.remedy
-
-
-@pytest.mark.parametrize("text", ["torque_saturation:2:limit=9", "backlash:2:gap=0.004"])
-def test_an_amplitude_that_physics_gives_need_not_be_given(text: str) -> None:
-    """A drive with a limit clips, and a gap is one."""
-    assert {p.name: p.value for p in acting_cause(text, REVOLUTE).parameters}["coefficient"] == 1.0
-
-
-@pytest.mark.parametrize(("text", "remedy"), [
-    ("cogging", "cogging:JOINT"), ("cogging:order=6", "cogging:JOINT:order=6"), ("payload:1", "payload"),
-    ("payload:1:mass=0.1", "payload:mass=0.1")])
-def test_what_to_write_is_no_more_than_what_was_meant(text: str, remedy: str) -> None:
-    with pytest.raises(UsageError) as refused:
-        wanted_cause(text, REVOLUTE)
-    assert refused.value.remedy == f"write {remedy}"
-
-
-@pytest.mark.parametrize("text", ["transmission_coupling:2:with_joint=7", "transmission_coupling:2:with_joint=2",
-                                  "link_length:link=3", "link_length:link=0.5", "encoder_crosstalk:1:from_joint=9"])
-def test_a_start_is_held_to_the_arm_as_well(text: str) -> None:
-    """What a fit starts from names a joint or a link that there is."""
-    with pytest.raises(UsageError, match="RRID-C02"):
-        wanted_cause(text, REVOLUTE)
-    assert wanted_cause("transmission_coupling:2:with_joint=3", REVOLUTE)[1] == {"with_joint": 3.0}
-    assert wanted_cause("link_length:link=2", REVOLUTE)[1] == {"link": 2.0}
-
-
-def test_a_pure_number_has_no_unit_to_show() -> None:
-    """And who is to give a number is told its range."""
-    with pytest.raises(UsageError, match=r"coefficient [^,]* to 2(,|\.)") as refused:
-        acting_cause("backlash:2", REVOLUTE)
-    assert not re.search(r"\d 1\b", refused.value.remedy)
-
-
-@pytest.mark.parametrize(("command", "of"), [("simulate", {}), ("demo", {"command": "demo"})])
-def test_the_command_that_was_called_lists_the_causes(command: str, of: dict[str, str]) -> None:
-    with pytest.raises(UsageError) as refused:
-        acting_cause("x", REVOLUTE, **of)
-    assert refused.value.remedy == f"'rrrid {command} --help' lists all causes"
-    with pytest.raises(UsageError) as refused:
-        wanted_cause("x", REVOLUTE, "--discriminate")
-    assert refused.value.remedy == "'rrrid design-excitation --help' lists all causes"

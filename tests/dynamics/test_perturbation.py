@@ -41,12 +41,6 @@ def test_a_perturbed_torque_is_pinocchios_derivative(case: Case, index: int) -> 
     assert np.abs(found - expected).max() <= 1e-7 * np.abs(expected).max()
 
 
-def test_nothing_perturbs_nothing(case: Case) -> None:
-    motion = Motion(np.arange(4.0), *random_states(np.random.default_rng(0), 4))
-    none = np.zeros(4)
-    assert not perturbed_torque(case.arm.torque, motion, 1, none, none, none).any()
-
-
 def coefficients(t: Array) -> tuple[Array, Array, Array, Array]:
     """m, c, k, f that vary as those of a moving arm do."""
     m, c = 0.4 + 0.1 * np.sin(5.0 * t), 3.0 + np.cos(7.0 * t)

@@ -95,11 +95,6 @@ def test_just_outside_is_rounding_and_farther_is_not(geometry: Geometry) -> None
     assert "not a number" in answer.words(2)
 
 
-def test_every_status_has_words() -> None:
-    """No status without a sentence."""
-    assert all(status.words for status in Reach)
-
-
 def angle(q: Array) -> Array:
     """`q` as the nearest angle to zero."""
     return np.asarray((q + np.pi) % (2 * np.pi) - np.pi)

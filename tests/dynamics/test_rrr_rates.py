@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from pipelines.dynamics.rrr_kinematics import joint_rates, rrr_geometry
 from tests.dynamics.serial_arms import ARMS
@@ -25,8 +24,3 @@ def test_pinocchio_moves_the_tip_as_asked(shared: Path, tmp_path: Path) -> None:
     found_velocity, found_acceleration = TipJudge(arm).rates(q, dq, ddq)
     assert np.abs(found_velocity - velocity).max() <= 1e-12
     assert np.abs(found_acceleration - acceleration).max() <= 1e-11 * max(1.0, np.abs(ddq).max())
-
-
-def test_other_shapes_are_refused() -> None:
-    with pytest.raises(ValueError, match="velocity has the shape"):
-        joint_rates(rrr_geometry(ARMS["rrr"](Path(), Path()).robot), np.zeros((4, 3)), np.zeros((3, 4)), np.zeros((4, 3)))

@@ -11,7 +11,6 @@ import pytest
 from pipelines.dynamics.base_parameters import BaseArm
 from pipelines.dynamics.body import Array, RigidBody
 from pipelines.dynamics.rrr import RRR
-from pipelines.dynamics.rrr_kinematics import inverse
 from pipelines.io.robot_files import load_robot
 
 ROBOT = load_robot("rrr")
@@ -35,22 +34,3 @@ def test_wrong_shapes_are_told_the_right_one(body: RigidBody, method: Callable[.
     for wrong in (np.zeros(n), np.zeros((n, 5)), np.zeros((5, n + 1)), np.zeros((2, 5, n)), np.zeros(())):
         with pytest.raises(ValueError, match=rf"q has the shape \(.*\), wanted is \(samples, {n}\)"):
             method(body, wrong, p)
-
-
-@pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
-def test_a_wrong_parameter_vector_and_unequal_samples(body: RigidBody) -> None:
-    """A vector of another arm, or speeds of another log, is not spread over the samples by broadcasting."""
-    n, count = body.robot.n_joints, len(body.parameters)
-    q = np.zeros((5, n))
-    for wrong in (np.zeros(count - 1), np.zeros((count, 1)), np.zeros(())):
-        for method in ("torque", "torque_parts", "mass_matrix"):
-            with pytest.raises(ValueError, match=rf"p has the shape .*, wanted is \({count},\)"):
-                METHODS[method](body, q, wrong)
-    with pytest.raises(ValueError, match=rf"dq has the shape \(1, {n}\), wanted is \(5, {n}\)"):
-        body.torque(q, q[:1], q, np.zeros(count))
-
-
-def test_a_tip_is_three_numbers() -> None:
-    """The inverse kinematics as well: one tip is (1, 3)."""
-    with pytest.raises(ValueError, match=r"tips has the shape \(3,\), wanted is \(samples, 3\)"):
-        inverse(RRR(ROBOT).geometry, np.zeros(3))

@@ -13,9 +13,6 @@ import pytest
 
 from bench.plant import as_log
 from pipelines.dynamics.arm import Acting, Arm
-from pipelines.dynamics.body import Motion
-from pipelines.dynamics.functions import NUMBERS
-from pipelines.effects.angle import Spring
 from pipelines.effects.base import Effect
 from pipelines.effects.bodies import GravityTilt, LinkLength
 from pipelines.effects.contact import Contact
@@ -141,15 +138,6 @@ def test_a_lagging_recorder_is_simulated() -> None:
     assert rms(simulated.tau[0] - recording.tau[:SAMPLES]) <= 1e-3 * made
 
 
-def test_a_spring_is_found_as_stiff_as_it_is() -> None:
-    """Where the joint passes the rest angle, the polynomial has the sealed stiffness there within 5 %, and the rest angle."""
-    _, _, found = fitted("spring", 3)
-    told = fault("spring", 3).parameters()
-    assert found["stiffness"] == pytest.approx(told["stiffness"], rel=0.05)
-    assert found["rest_angle"] == pytest.approx(told["rest_angle"], abs=0.02)
-    assert found["hardening"] > 0.0
-
-
 def test_the_length_that_fits_best_is_the_true_one() -> None:
     """With base parameters refitted at each, the sealed length leaves less than 5 mm more or less, which leave less than none."""
     effect, values = effect_of("link_length", None)
@@ -180,56 +168,3 @@ def test_a_level_arm_tells_nothing_of_its_waist() -> None:
     assert not columns[:, 1:, 2:].any()
     leaning = replace(machine().robot, gravity=(9.81, 0.0, 0.0))
     assert not GravityTilt().columns(motion, Arm.from_links(leaning))[:, :, 2:].any()
-
-
-def test_a_spring_of_three_zeros_rests_at_the_one_near_its_line() -> None:
-    """(q - 1)(q - 2)(q + 3) = q³ - 7 q + 6: the line -7 q + 6 is zero at 0.86."""
-    found = Spring(1, degree=3).values([-7.0, 6.0, 0.0, 1.0])
-    assert found["rest_angle"] == pytest.approx(1.0)
-    assert found["stiffness"] == pytest.approx(-4.0)  # (1 - 2)(1 + 3)
-
-
-def test_a_spring_goes_straight_on_beyond_the_angles_it_was_fitted_to() -> None:
-    """By NumPy's tangent at either end, in columns, in the simulation, and after a model file."""
-    fitted = np.polynomial.Polynomial([0.3, -0.2, 0.4, 0.8, -0.1, 0.3])
-    spring = Spring(1, degree=5, seen_from=-0.7, seen_to=1.1)
-    q = np.linspace(-3.0, 3.0, 61)
-    ends = np.clip(q, -0.7, 1.1)
-    expected = fitted(ends) + fitted.deriv()(ends) * (q - ends)
-    assert np.abs(expected - fitted(q)).max() > 10.0  # the polynomial itself ends elsewhere
-    amplitudes = [fitted.coef[1], fitted.coef[0], *fitted.coef[2:]]
-    robot = Arm.from_links(machine().robot)
-    stored = robot.extended(Acting.of(spring, spring.values(amplitudes))).to_model()
-    read = Arm.from_model(stored).effects[0]
-    motion = Motion(np.arange(61.0), np.column_stack([q, q, q]), np.zeros((61, 3)), np.zeros((61, 3)))
-    columns = spring.columns(motion, robot)[:, 0] @ np.array(amplitudes)
-    np.testing.assert_allclose(columns, expected, atol=1e-12)
-    for effect, values in ((spring, spring.values(amplitudes)), (read.effect, read.values)):
-        load = effect.own_load(values)
-        assert load is not None
-        np.testing.assert_allclose([load(x, 0.0, NUMBERS) for x in q], expected, atol=1e-10)
-
-
-def test_a_spring_of_seven_powers_is_the_polynomial_that_was_fitted() -> None:
-    """NumPy's polynomial says so, wherever its zero lies; a file from before the sixth and seventh power says the same of five."""
-    fitted = np.array([0.3, -0.2, 0.4, 0.8, -0.1, 0.3, 0.05, -0.2])  # from the constant upwards
-    spring, q = Spring(1), np.linspace(-1.2, 1.2, 25)
-    values = spring.values([fitted[1], fitted[0], *fitted[2:]])
-    load = spring.own_load(values)
-    np.testing.assert_allclose([load(x, 0.0, NUMBERS) for x in q], np.polynomial.Polynomial(fitted)(q), atol=1e-12)
-    assert load(values["rest_angle"], 0.0, NUMBERS) == pytest.approx(0.0, abs=1e-12)
-    five = Spring(1, degree=5).values([fitted[1], fitted[0], *fitted[2:6]])
-    whole = Arm.from_links(machine().robot).extended(Acting.of(Spring(1, degree=5), five)).to_model()
-    before = {name: value for name, value in whole.effects[0].parameters.items() if name not in ("sixth", "seventh")}
-    arm_then = Arm.from_model(replace(whole, effects=(replace(whole.effects[0], parameters=before),)))
-    old = arm_then.effects[0]
-    load = old.effect.own_load(old.values)
-    assert load is not None
-    np.testing.assert_allclose([load(x, 0.0, NUMBERS) for x in q], np.polynomial.Polynomial(fitted[:6])(q), atol=1e-12)
-
-
-def test_a_gap_of_nothing_is_no_backlash() -> None:
-    """A refit that closes the gap has explained nothing by it."""
-    effect, values = effect_of("backlash", 2)
-    assert effect.possible(values)
-    assert not effect.possible(values | {"gap": 0.0})

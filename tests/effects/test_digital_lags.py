@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from pipelines.dynamics.body import Motion
-from pipelines.effects.drives import DriveLag, TorqueCrosstalk, TorqueLag
+from pipelines.effects.drives import DriveLag, TorqueLag
 from tests.effects.on_bench import arm as described
 
 _H, _T = 1e-3, 5e-3  # [s] sample time, time constant
@@ -30,30 +30,3 @@ def test_a_digital_filter_is_met_on_all_samples_and_on_some(every: int) -> None:
                 found = kind(joint=joint).at(values).apply(motion, arm, values, lambda m, a, x=before: x[::every].copy())
                 off.append(np.abs(found - behind[::every])[inner, joint - 1].max())
             assert off[0] < 2e-3 < 5e-3 < off[1]
-
-
-def test_a_simulated_digital_drive_is_the_filter() -> None:
-    arm = described()
-    command = np.random.default_rng(0).normal(size=(200, 1, arm.n_joints))
-    values = {"time_constant": _T, "sample_time": _H}
-    hooks = DriveLag(joint=2).simulate(arm, values)
-    assert hooks.update is not None
-    assert hooks.actuator is not None
-    assert hooks.start is not None
-    still, made = np.zeros((1, arm.n_joints)), []
-    states = hooks.start(Motion(np.zeros(1), still, still, still), still)
-    for k, u in enumerate(command):
-        states = hooks.update(Motion(np.array([k * _H]), still, still, still), u, states)
-        applied = hooks.actuator(u, Motion(np.array([(k + 0.6) * _H]), still, still, still), states)
-        made.append(applied[0])
-    a = np.exp(-_H / _T)
-    u = command[:, 0]
-    expected = u.copy()
-    expected[:, 1] = lfilter([1.0 - a], [1.0, -a], u[:, 1], zi=np.array([a * u[0, 1]]))[0]
-    np.testing.assert_allclose(made, expected, rtol=0.0, atol=1e-12)
-
-
-def test_a_time_is_slight_within_a_tenth_of_a_sample_and_a_share_within_its_own() -> None:
-    assert DriveLag.parameters.slight(_H) == pytest.approx(2e-4)  # a current loop of 800 Hz
-    assert DriveLag.parameters.slight(4.0 * _H) == pytest.approx(4e-4)
-    assert TorqueCrosstalk.parameters.slight(4.0 * _H) == pytest.approx(2e-3)

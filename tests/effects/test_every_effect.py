@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ast
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,18 +14,12 @@ from pipelines.dynamics.body import Array, Motion
 from pipelines.effects import all_effects, effect_names, find_effect
 from pipelines.effects.base import Effect, FrictionLaw, adds, everywhere
 from pipelines.effects.parameters import causes
-from pipelines.errors import UsageError
 from sample_logs.make_model import synthetic_arm
 
 UNITS = {"1", "1/rev", "Hz", "s", "s/rad", "rad", "rad/s", "m", "kg", "kg m", "kg m^2", "N", "N m", "N m s/rad",
          "N m/rad", "N m/rad^2", "N m/rad^3", "N m/rad^4",
          "N m/rad^5", "N m/rad^6", "N m/rad^7", "N m s^2/rad^2"}
 REPO = Path(__file__).resolve().parents[2]
-# Where names of effects stand all the same: the laws among which friction is fitted and their report, the nominal model, what a
-# frequency response tells apart without any motion, and the forms of other programs, which have terms of their own.
-MAY_NAME = ("pipelines/friction/", "pipelines/report/friction_report.py", "pipelines/estimation/nominal.py",
-            "pipelines/frequency/", "pipelines/export/")
-NOMINAL = {"coulomb", "viscous", "two_sigmoid", "three_sigmoid"}  # laws that a nominal model has
 FOLDER = REPO / "pipelines" / "effects"
 
 every_effect = pytest.mark.parametrize("kind", all_effects(), ids=lambda kind: kind.name)
@@ -82,36 +74,6 @@ def test_every_entry_of_the_table_is_an_effect() -> None:
                          re.MULTILINE)
     assert sorted(written) == sorted(effect_names())
     assert {"coulomb", "viscous", "three_sigmoid"} <= set(written)
-
-
-def _named_in(path: Path, names: set[str]) -> Iterator[str]:
-    """Each of `names` that a Python file has as a text, or imports; a function of its own may be called like one."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    names = names - {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and node.value in names:
-            yield str(node.value)
-        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("pipelines.effects."):
-            yield from {re.sub(r"(?<=[a-z])(?=[A-Z])", "_", one.name).lower() for one in node.names} & names
-
-
-@pytest.mark.slow
-def test_no_effect_is_named_elsewhere(tmp_path: Path) -> None:
-    """What an effect needs is in its file: no stage, no report and no diagnosis knows one by name."""
-    names = set(effect_names()) - NOMINAL
-    for path in [file for top in ("pipelines", "rrrid_cli") for file in sorted((REPO / top).rglob("*.py"))]:
-        place = path.relative_to(REPO).as_posix()
-        if not place.startswith(("pipelines/effects/", "bench/", *MAY_NAME)):
-            assert not list(_named_in(path, names)), place
-    breach = tmp_path / "breach.py"
-    breach.write_text('from pipelines.effects.angle import Spring\nx = "cogging"\n')
-    assert sorted(_named_in(breach, names)) == ["cogging", "spring"]
-
-
-def test_an_unknown_name_is_answered_with_the_nearest() -> None:
-    """A slip of the pen gets a hint."""
-    with pytest.raises(UsageError, match="did you mean 'viscous'"):
-        find_effect("viscos")
 
 
 @every_effect
@@ -193,17 +155,6 @@ def test_a_simulation_counts_time_from_the_start_of_the_log_as_well(cause: str, 
     expected = effect.torque(motion, arm, values)[some]
     assert np.abs(expected).max() > 0.0
     np.testing.assert_allclose(hooks.load(part, states), expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
-
-
-@pytest.mark.parametrize("kind", [one for one in all_effects() if getattr(one, "from_motion", False)], ids=lambda kind: kind.name)
-def test_columns_from_the_motion_alone(kind: type[Effect], arm: Arm, motion: Motion) -> None:
-    """They are those of any arm, act on their own joint only, and come out the same for many shapes at once."""
-    other = Arm("another", arm.body, tuple(replace(p, value=1.7 * p.value + 0.1) for p in arm.base))
-    shapes = list(placed(kind).shapes(motion, arm))
-    apart = np.array([shape.columns(motion, other) for shape in shapes])
-    assert not np.delete(apart, 1, axis=2).any()
-    together = shapes[0].own_columns(shapes, motion, arm)
-    np.testing.assert_allclose(together.transpose(0, 2, 1), apart[:, :, 1], rtol=1e-9, atol=1e-9 * np.abs(apart).max())
 
 
 @every_effect

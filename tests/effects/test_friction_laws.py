@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pytest
 
 from pipelines.dynamics.body import Array, Motion
-from pipelines.effects.friction import Coulomb, ThreeSigmoid, TwoSigmoid
+from pipelines.effects.friction import ThreeSigmoid
 from sample_logs.make_model import FRICTION, synthetic_arm
 
 
@@ -41,19 +40,6 @@ def test_the_synthetic_friction_is_that_of_the_reference(vectors: dict[str, Any]
         assert canonical == named(list(f), list(w), b)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_forty_eight_sets_are_one(seed: int) -> None:
-    """Whatever order and signs a fit returns, the canonical set is the same and so is the curve."""
-    rng = np.random.default_rng(seed)
-    f, w = rng.normal(size=3), np.sort(rng.uniform(1, 200, 3))[::-1]
-    order, sign = rng.permutation(3), rng.choice([-1.0, 1.0], 3)
-    shuffled = named((f[order] * sign).tolist(), (w[order] * sign).tolist(), 0.3)
-    assert ThreeSigmoid.canonical(shuffled) == named(f.tolist(), w.tolist(), 0.3)
-    v, arm = np.linspace(-3, 3, 50), synthetic_arm()
-    np.testing.assert_allclose(ThreeSigmoid(1).curve(v, arm, shuffled),
-                               ThreeSigmoid(1).curve(v, arm, ThreeSigmoid.canonical(shuffled)), rtol=1e-12)
-
-
 def test_the_grid_is_ordered_and_finds_a_known_curve() -> None:
     """Every shape has w1 > w2 > w3 > 0, and the best of them leaves 1 % of the synthetic friction curve."""
     arm, v = synthetic_arm(), sweep()
@@ -68,32 +54,6 @@ def test_the_grid_is_ordered_and_finds_a_known_curve() -> None:
         left.append(np.linalg.norm(truth - X @ np.linalg.lstsq(X, truth, rcond=None)[0]) / np.linalg.norm(truth))
     assert len(left) == 56
     assert min(left) < 0.01
-
-
-def test_two_sigmoids_are_three_of_which_one_has_no_height() -> None:
-    """Curve and simulated curve; and their grid has every pair of eight sharpnesses once, the sharper first."""
-    v, arm = np.linspace(-2, 2, 401), synthetic_arm()
-    two = TwoSigmoid(1)
-    values = named([3.0, -1.0], [90.0, 12.0], 0.1)
-    three = ThreeSigmoid(1).curve(v, arm, named([3.0, -1.0, 0.0], [90.0, 12.0, 1.0], 0.1))
-    np.testing.assert_allclose(two.curve(v, arm, values), three, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(two.speed_curve(values).torque(v), three, rtol=1e-12, atol=1e-12)
-    motion = Motion(np.arange(10.0), np.zeros((10, 3)), np.linspace(-1.0, 1.0, 30).reshape(10, 3), np.zeros((10, 3)))
-    pairs = [(law.w1, law.w2) for law in two.shapes(motion, arm)]
-    assert len(set(pairs)) == 28
-    assert all(sharper > blunter > 0.0 for sharper, blunter in pairs)
-
-
-def test_a_joint_at_rest_still_has_shapes() -> None:
-    """A motion without motion gives a grid all the same."""
-    still = np.zeros((10, 3))
-    assert len(list(ThreeSigmoid(1).shapes(Motion(np.arange(10.0), still, still, still), synthetic_arm()))) == 56
-
-
-def test_coulomb_saturates() -> None:
-    """Ten times the width away from zero, Coulomb friction is its level."""
-    curve = Coulomb(1).curve(np.array([-0.1, 0.1]), synthetic_arm(), {"level": 4.8, "sharpness": 100.0})
-    np.testing.assert_allclose(curve, [-4.8, 4.8], rtol=1e-8)
 
 
 def sweep() -> Array:

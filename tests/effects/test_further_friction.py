@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pipelines.dynamics.body import Array, Motion
-from pipelines.dynamics.functions import ARRAYS, NUMBERS
+from pipelines.dynamics.functions import ARRAYS
 from pipelines.effects.angle import PositionFriction
 from pipelines.effects.drives import LoadFriction
 from pipelines.effects.friction import AsymmetricFriction
@@ -58,22 +58,6 @@ def test_presliding_solves_its_differential_equation(distance: float, time: floa
     assert np.abs(found - expected).max() < (missed + 1e-4) * np.abs(expected).max()
 
 
-@pytest.mark.parametrize("breakaway", [0.0, 0.6])
-def test_presliding_of_one_sample_is_relaxed(breakaway: float) -> None:
-    here = swinging(samples=2)
-    motion = Motion(here.t[:1], here.q[:1], here.dq[:1], here.ddq[:1])
-    assert not Presliding(2, breakaway=breakaway).columns(motion, synthetic_arm()).any()
-
-
-def test_presliding_starts_again_from_where_it_was() -> None:
-    """A pause changes nothing: bristles stay bent."""
-    motion, arm = swinging(), synthetic_arm()
-    stop = np.concatenate([np.arange(1500), np.full(300, 1500), np.arange(1500, 4001)])
-    paused = Motion(np.arange(len(stop)) * 1e-3, motion.q[stop], motion.dq[stop], motion.ddq[stop])
-    whole, halted = (Presliding(2, distance=0.02).columns(m, arm)[:, 1, 0] for m in (motion, paused))
-    np.testing.assert_allclose(np.delete(halted, np.arange(1500, 1800)), whole, atol=1e-12)
-
-
 @pytest.mark.parametrize(("law", "time"), [
     ({}, 0.0), ({}, 1e-3), ({"elastic": 0.5}, 0.0), ({"elastic": 0.5}, 1e-3), ({"elastic": 0.3, "exponent": 0.6}, 0.0),
     ({"elastic": 0.2, "inner_loops": 1.0}, 0.0), ({"breakaway": 0.5, "breakaway_speed": 0.3}, 1e-3)],
@@ -118,28 +102,6 @@ def test_what_rubs_behind_a_gear_loads_it_too() -> None:
     np.testing.assert_allclose(found, passed * (1.0 + 0.1 * np.sign(passed) * np.tanh(80.0 * motion.dq[:, 1])), rtol=1e-12)
 
 
-def test_a_gear_may_lose_a_part_of_what_goes_in() -> None:
-    """The drive gives τ = τ_l + 0.15 |τ| tanh(w v): a part of its own torque, of which the loss is a part itself."""
-    motion, arm = swinging(), synthetic_arm()
-    values = {"mu": 0.15, "sharpness": 80.0, "behind": 1.0, "input_side": 1.0}
-    found = LoadFriction(2).apply(motion, arm, values)[:, 1]
-    lost = 0.15 * np.abs(found) * np.tanh(80.0 * motion.dq[:, 1])
-    np.testing.assert_allclose(found - lost, arm.torque(motion)[:, 1], rtol=1e-12, atol=1e-12)
-
-
-@pytest.mark.parametrize("behind", [0.0, 1.0])
-def test_the_curve_of_load_friction_has_what_rubs_behind_the_gear(behind: float) -> None:
-    """µ |τ_g + s f(v)| at steady speed; what goes up a weight rubs more than what comes down where s is 1."""
-    arm, v = synthetic_arm(), np.array([-1.0, 1.0])
-    still = np.zeros((2, arm.n_joints))
-    resting = Motion(np.zeros(2), still, still, still)
-    moving = replace(resting, dq=np.outer(v, np.arange(arm.n_joints) == 1))
-    weight, rubs = arm.torque(resting)[:, 1], arm.friction_torque(moving)[:, 1]
-    assert np.abs(weight).min() > np.abs(rubs).max() > 0.0
-    found = LoadFriction(2).curve(v, arm, {"mu": 0.1, "sharpness": 500.0, "behind": behind})
-    np.testing.assert_allclose(found, 0.1 * (np.abs(weight) + behind * rubs * np.sign(weight)) * np.sign(v), rtol=1e-9)
-
-
 def test_position_friction_is_a_wave_along_the_turn() -> None:
     """Amplitude, order and phase mean A sin(k q + φ) against the direction of motion, and likewise of its harmonics."""
     motion, arm = swinging(), synthetic_arm()
@@ -151,38 +113,6 @@ def test_position_friction_is_a_wave_along_the_turn() -> None:
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
-def test_a_wave_of_position_friction_is_held_where_it_is_whole() -> None:
-    """What turns with the joint repeats with it; a form behind a gear lets go of the order. A refit takes no more harmonics than
-    half waves were travelled."""
-    motion, arm = swinging(), synthetic_arm()
-    for shape in PositionFriction(2).shapes(motion, arm):
-        full = shape.forms()[0]
-        assert full.order.is_integer()
-        assert full.free == ("sharpness",)
-        _, *finer, geared = full.forms()
-        assert geared.free == ("order", "sharpness")
-        assert [form.harmonics for form in finer] == list(range(full.harmonics + 1, 4))
-        assert full.harmonics == max(1, min(3, int(full.order * np.ptp(motion.q[:, 1]) / np.pi)))
-
-
-def test_bands_of_wear_need_no_whole_turn() -> None:
-    """Where it rubs in one band, ¼ (1 + cos q)² along the turn, less than half a turn of it is no sine, and the second harmonic is
-    all that lacks."""
-    narrow, arm = swinging(), synthetic_arm()
-    motion = replace(narrow, q=4.0 * narrow.q, dq=4.0 * narrow.dq, ddq=4.0 * narrow.ddq)
-    q, turned = motion.q[:, 1], np.tanh(100.0 * motion.dq[:, 1])
-    rubs = (3.0 / 8.0 + 0.5 * np.cos(q - 0.2) + np.cos(2.0 * (q - 0.2)) / 8.0) * turned
-    first = next(iter(PositionFriction(2).shapes(motion, arm)))
-
-    def left(form: PositionFriction) -> float:
-        table = np.column_stack([turned, form.columns(motion, arm)[:, 1]])
-        return float(np.abs(rubs - table @ np.linalg.lstsq(table, rubs, rcond=None)[0]).max())
-
-    assert np.ptp(q) < np.pi
-    assert left(first.forms()[0]) > 0.05
-    assert left(next(form for form in first.forms()[1:] if form.harmonics == 2)) < 1e-9
-
-
 @pytest.mark.parametrize("gradual", [0.0, 1.0])
 def test_asymmetric_friction_adds_half_to_each_side(gradual: float) -> None:
     """Fc + ½ ΔFc one way, Fc - ½ ΔFc the other, likewise Fv."""
@@ -190,30 +120,3 @@ def test_asymmetric_friction_adds_half_to_each_side(gradual: float) -> None:
     forth, back = AsymmetricFriction(1).curve(np.array([2.0, -2.0]), synthetic_arm(), values)
     assert forth == pytest.approx(0.3 + 0.2)
     assert back == pytest.approx(0.3 + 0.2)
-
-
-def test_directions_that_go_over_gradually_are_fitted_as_such() -> None:
-    """A joint that creeps about standstill: friction F(v) tanh(w v) whose F changes from one direction to the other as tanh(w v)
-    does. The difference comes out of the law that goes over so; the one that changes at once misses it by a tenth and more."""
-    v, arm = 0.05 * np.sin(np.linspace(0.0, 60.0, 4001)), synthetic_arm()
-    turned = np.tanh(100.0 * v)
-    measured = (0.8 + 0.5 * 0.4 * turned) * turned + (0.3 + 0.5 * 0.1 * turned) * v
-    still = np.zeros((len(v), arm.n_joints))
-    motion = Motion(np.zeros(len(v)), still, np.repeat(v[:, None], arm.n_joints, axis=1), still)
-
-    def fitted(form: AsymmetricFriction) -> tuple[float, float]:
-        table = np.column_stack([turned, v, form.columns(motion, arm)[:, 1]])
-        numbers = np.linalg.lstsq(table, measured, rcond=None)[0]
-        return float(numbers[2]), float(np.sqrt(np.mean(np.square(measured - table @ numbers))))
-
-    first = next(one for one in AsymmetricFriction(2).shapes(motion, arm) if one.sharpness == 100.0)
-    _, gradual = first.forms()
-    at_once, left = fitted(first)
-    difference, least = fitted(gradual)
-    assert difference == pytest.approx(0.4, rel=1e-9)
-    assert least < 1e-12
-    assert abs(at_once - 0.4) > 0.1 * 0.4
-    assert left > 1e-3
-    load = gradual.own_load(gradual.values([0.4, 0.1]))
-    assert load is not None
-    assert [load(0.0, speed, NUMBERS) for speed in v[:50]] == pytest.approx(list(0.5 * turned[:50] * (0.4 * turned[:50] + 0.1 * v[:50])))

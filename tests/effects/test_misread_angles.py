@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.arm import Acting, Arm
-from pipelines.dynamics.body import Array, Motion
+from pipelines.dynamics.body import Motion
 from pipelines.effects.angle import Cogging
-from pipelines.effects.encoders import EncoderCrosstalk, TimeDelay
+from pipelines.effects.encoders import EncoderCrosstalk
 from pipelines.effects.friction import TorqueOffset
 from sample_logs.make_model import synthetic_arm
 from tests.dynamics.rrr_arms import random_states
@@ -48,21 +48,3 @@ def test_cogging_is_felt_at_the_true_angle(motion: Motion) -> None:
         for one in order:
             step_by_step = step_by_step.extended(one)
         np.testing.assert_allclose(step_by_step.torque(motion), wanted, atol=1e-9)
-
-
-def test_cogging_beside_a_late_encoder_is_felt_where_the_joint_is_by_now() -> None:
-    """Read 5 ms late at up to 2.5 rad/s: at order 35 nearly half a radian of phase."""
-    delay, speeds, t = 0.005, np.array([2.0, 2.5, 3.0]), np.arange(0.0, 4.0, 1e-3)
-
-    def moved(t: Array) -> list[Array]:
-        angle = np.outer(t, speeds)
-        return [np.sin(angle), speeds * np.cos(angle), -speeds**2 * np.sin(angle)]
-
-    arm, true, seen = synthetic_arm(), moved(t), moved(t)
-    for signal, late in zip(seen, moved(t - delay), strict=True):
-        signal[:, 1] = late[:, 1]
-    wanted = arm.torque(Motion(t, *true))
-    wanted[:, 1] += _AMPLITUDE * np.sin(_ORDER * true[0][:, 1])
-    for order in permutations((Acting.of(TimeDelay(2), {"delay": delay}), waving())):
-        torque = arm.extended(*order).torque(Motion(t, *seen))
-        np.testing.assert_allclose(torque[50:-50], wanted[50:-50], atol=1e-3 * _AMPLITUDE)

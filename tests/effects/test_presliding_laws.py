@@ -123,19 +123,3 @@ def test_a_law_fitted_to_one_motion_holds_on_another(law: Law, inner: float, num
         v, motion = moving(seed)
         missed = amplitude * effect.columns(motion, synthetic_arm())[:, 1, 0] - law(v)[::EVERY]
         assert np.sqrt(np.mean(np.square(missed))) < share * AMPLITUDE
-
-
-@pytest.mark.parametrize("elastic", [-1.0, -0.4, 0.0, 0.6])
-@pytest.mark.parametrize(("inner", "exponent"), [(0.0, 1.0), (0.0, 0.5), (1.0, 1.0)])
-def test_friction_is_zero_at_the_same_travel_whatever_the_shape(elastic: float, inner: float, exponent: float) -> None:
-    """x_c ln 2 after a reversal while sliding; there it was -1 before, and goes to 1."""
-    travel = np.concatenate([np.linspace(0.0, 0.5, 4001), 0.5 - np.linspace(0.0, 0.5, 4001)])
-    still = np.zeros((len(travel), 3))
-    q = still.copy()
-    q[:, 1] = travel
-    u = Presliding(2, distance=0.03, elastic=elastic, exponent=exponent, inner_loops=inner).columns(
-        Motion(np.arange(len(travel)) * 1e-3, q, still, still), synthetic_arm())[:, 1, 0]
-    back = -u[4001:]
-    assert back[0] == pytest.approx(-1.0, abs=1e-4)
-    assert back[-1] == pytest.approx(1.0, abs=1e-4)
-    assert np.interp(0.0, back, 0.5 - travel[4001:]) == pytest.approx(0.03 * np.log(2.0), rel=0.03)

@@ -20,14 +20,13 @@ from bench.plant import Recording, as_log
 from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Motion
 from pipelines.effects import find_effect
-from pipelines.effects.backlash import Backlash
 from pipelines.effects.base import ArmModel, Effect, Hooks, Parameters, Values, Words
 from pipelines.effects.encoders import EncoderCrosstalk, EncoderEccentricity, TimeDelay
 from pipelines.effects.soft import JointElasticity
 from pipelines.io.log import Array, Controller
 from pipelines.simulation import Experiment, Plant, run, simulate_windows
 from tests.effects.on_bench import arm, fault, faulty, healthy, machine, planned, rms
-from tests.seeds import rarely, usually
+from tests.seeds import usually
 from tests.simulation.arms import KD, KP, experiment
 
 CUTOFF_HZ = 20.0
@@ -103,22 +102,6 @@ def test_the_opposite_sign_is_wrong() -> None:
     for name, opposite in (("encoder_eccentricity", "amplitude"), ("encoder_crosstalk", "coefficient"), ("time_delay", "delay")):
         effect, values = sealed(name, 2)
         assert explained(name, 2, values | {opposite: -values[opposite]}, effect) < -0.5
-
-
-@pytest.mark.parametrize("wrong", [0.7, 1.4])
-def test_a_gap_of_another_width_explains_less(wrong: float) -> None:
-    effect, values = sealed("backlash", 1)
-    other = values | {"gap": wrong * values["gap"]}
-    right = explained("backlash", 1, values, effect, RUNG_OUT)
-    assert explained("backlash", 1, other, effect.at(other), RUNG_OUT) < right - 0.1
-
-
-def test_the_motor_behind_a_gap_need_not_be_known() -> None:
-    """Half as heavy or half as heavy again, it explains as much of the burst within a tenth."""
-    effect, values = sealed("backlash", 1)
-    for wrong in (0.5, 1.5):
-        other = values | {"motor_inertia": wrong * values["motor_inertia"]}
-        assert explained("backlash", 1, other, effect.at(other), RUNG_OUT) > 0.9
 
 
 @pytest.mark.parametrize(("name", "joint"), [*SENSORS, ("base_resonance", None), ("joint_elasticity", 1)])
@@ -206,19 +189,6 @@ def test_windows_start_where_the_arm_truly_was(name: str, apart: float) -> None:
     assert error[1] < apart * error[0]
 
 
-@pytest.mark.parametrize("other", [
-    Acting.of(TimeDelay(2), {"delay": 3.3e-3}),
-    Acting.of(JointElasticity(2), {"stiffness": 14000.0, "damping": 4.0, "frequency": 30.0, "motor_inertia": 0.05})],
-    ids=lambda acting: acting.effect.name)
-def test_two_faults_of_one_encoder_are_both_read(other: Acting) -> None:
-    """Where an eccentric disc leads the arm does not depend on whether it was accepted before the other cause or after it."""
-    eccentric = Acting.of(EncoderEccentricity(2), {"amplitude": 4e-3, "phase": 0.4})
-    log = as_log(machine(), planned(), healthy())
-    q = [run(Plant.of(arm().extended(*acting)), Experiment.of_log(log).part(0, 150), 4).true_q[0]
-         for acting in ((eccentric, other), (other, eccentric), (other,))]
-    assert rms(q[0] - q[1]) < 0.01 * rms(q[0] - q[2])
-
-
 @pytest.mark.parametrize(("effect", "values", "size"), [
     (TimeDelay(2), {"delay": 1.0}, 1e-8), (EncoderEccentricity(2), {"amplitude": 1.0, "phase": 0.7}, 1e-6),
     (EncoderCrosstalk(3, 1.0), {"coefficient": 1.0, "from_joint": 1.0}, 1e-6)], ids=lambda x: getattr(x, "name", ""))
@@ -231,38 +201,6 @@ def test_columns_are_the_slope_of_the_exact_form(effect: Effect, values: dict[st
     assert np.abs((ahead - behind) / (2.0 * size) - columns).max() <= 1e-5 * np.abs(columns).max()
 
 
-def test_a_very_stiff_joint_is_its_column() -> None:
-    """With a motor of its own, to first order in the compliance: 1 % where the stiffness is 1e9 N m/rad."""
-    motion, _ = _read(healthy())
-    effect = JointElasticity(2).at({"stiffness": 1e9, "damping": 0.0, "frequency": 1e4, "motor_inertia": 0.05})
-    values = effect.values([1e-9])
-    change = effect.apply(motion, arm(), values) - arm().torque(motion)
-    first = effect.columns(motion, arm())[..., 0] * 1e-9
-    assert rms(low_passed(change - first)[100:-100]) <= 0.01 * rms(low_passed(first)[100:-100])
-
-
-def test_a_heavy_base_is_its_column() -> None:
-    """To first order in 1/I: 1 % where the base weighs a thousand times the arm."""
-    motion, _ = _read(healthy())
-    effect, told = sealed("base_resonance", None)
-    values = told | {"inertia": 1e4}
-    change = effect.apply(motion, arm(), values) - arm().torque(motion)
-    first = effect.columns(motion, arm())[..., 0] * 1e-4
-    assert rms(change - first) <= 0.01 * rms(first)
-
-
-def test_findings_have_the_parameters_of_causes() -> None:
-    """Sealed numbers pass through shape and amplitudes unchanged, phase and frequency included."""
-    for name, joint in (("time_delay", 1), ("encoder_eccentricity", 2), ("encoder_crosstalk", 3), ("joint_elasticity", 2),
-                        ("base_resonance", None), ("backlash", 3)):
-        effect, values = sealed(name, joint)
-        told = dict(fault(name, joint).parameters())
-        if "phase" in told:
-            told["phase"] = float(np.angle(np.exp(1j * float(told["phase"]))))  # type: ignore[arg-type]
-        reported = effect.reported(effect.values(effect.amplitudes(values)))
-        assert {key: reported[key] for key in told} == pytest.approx(told, rel=1e-9), name
-
-
 def test_an_elastic_joints_frequency_follows_its_stiffness() -> None:
     """Of what was scanned on a motion: √(k/J)/2π with J what the joint feels on average less the motor."""
     motion, _ = _read(healthy())
@@ -272,39 +210,3 @@ def test_an_elastic_joints_frequency_follows_its_stiffness() -> None:
         found = effect.values([1.0 / k])
         link = felt - found["motor_inertia"]
         assert found["frequency"] == pytest.approx(np.sqrt(k / link) / (2.0 * np.pi), rel=0.01)
-
-
-@pytest.mark.parametrize("crossing", [2e-3, *rarely(6e-3, 2e-2), 4e-2])
-def test_a_gap_is_looked_for_however_thick_its_lubricant(crossing: float) -> None:
-    """The usual torque carries the link through a gap of 1.2 mrad in so many seconds: some shape explains more than half of the
-    power of its torque, and the best of them is within a half of the gap."""
-    motion, _ = read("backlash", 1)
-    shapes = list(Backlash(1).shapes(motion, arm()))
-    usual = shapes[0].film * shapes[0].gap / 3e-3
-    there = Backlash(1, gap=1.2e-3, film=crossing * usual / 1.2e-3, motor_inertia=1.3 * shapes[0].motor_inertia)
-    truth, *tried = (low_passed(one.columns(motion, arm())[..., 0])[RUNG_OUT:-100] for one in (there, *shapes))
-    left_over = [rms(truth - one) / rms(truth) for one in tried]
-    best = int(np.argmin(left_over))
-    assert left_over[best] ** 2 < 0.5
-    assert 0.5 * 1.2e-3 < shapes[best].gap < 1.5 * 1.2e-3
-
-
-def test_a_gap_is_looked_for_from_a_third_of_a_milliradian_on() -> None:
-    """The best of the shapes that are tried on a log with a gap of 4 mrad is within a third of it, and explains most of it."""
-    motion, tau = read("backlash", 1)
-    before = left(tau, arm().torque(motion), RUNG_OUT)
-    shares = {shape: 1.0 - (rms(before - low_passed(shape.columns(motion, arm())[..., 0])[RUNG_OUT:-100]) / rms(before)) ** 2
-              for shape in Backlash(1).shapes(motion, arm())}
-    best = max(shares, key=lambda shape: shares[shape])
-    assert 0.67 * 4e-3 < best.gap < 1.5 * 4e-3, shares
-    assert shares[best] > 0.5
-
-
-@pytest.mark.parametrize("joint", [1, *rarely(2, 3)])
-def test_gaps_that_are_tried_at_once_are_those_tried_alone(joint: int) -> None:
-    """Many share the slopes of the rigid torque, which for gaps of up to 6.6 mrad are its difference to a thousandth."""
-    motion, _ = read("backlash", 1)
-    shapes = list(Backlash(joint).shapes(motion, arm()))
-    for shape, column in zip(shapes, shapes[0].several(shapes, motion, arm()), strict=True):
-        alone = shape.columns(motion, arm())
-        assert np.linalg.norm(column - alone) < 2e-3 * np.linalg.norm(alone)

@@ -58,10 +58,3 @@ def test_a_law_fitted_to_some_speeds_holds_at_others(law: Callable[[Array], Arra
     falls = np.interp(-1.0 / np.e, -law(np.geomspace(1e-3, 5.0, 4000)) / AMPLITUDE, np.geomspace(1e-3, 5.0, 4000))
     assert form.speed == pytest.approx(float(falls), rel=1e-3 if left < 1e-3 else 0.05)
     assert amplitude == pytest.approx(AMPLITUDE, rel=0.03)
-
-
-@pytest.mark.parametrize(("speed", "possible"), [(0.15, True), (0.02, True), (0.013, False)])
-def test_a_hump_within_the_change_of_sign_is_none(speed: float, possible: bool) -> None:
-    """With w = 100 s/rad friction has changed its sign at 0.02 rad/s: what is over before mends the shape of that."""
-    hump = Stribeck(2, speed=speed, sharpness=100.0)
-    assert hump.possible(hump.values([0.3])) is possible

@@ -9,7 +9,7 @@ import pytest
 
 from pipelines.dynamics.base_parameters import BaseArm
 from pipelines.dynamics.rrr_kinematics import rrr_geometry, tip
-from pipelines.errors import Interrupted, UsageError
+from pipelines.errors import UsageError
 from pipelines.excitation.discrimination import Found
 from pipelines.excitation.optimise import Design, Effort, design, landscape
 from pipelines.excitation.regressor import grams_of
@@ -104,29 +104,6 @@ def test_a_run_in_keeps_the_limits() -> None:
     step = GRID * (dq[:, 1:] + dq[:, :-1]) / 2
     np.testing.assert_allclose(np.diff(q, axis=1), step, atol=1e-8)
     assert np.abs(np.diff(ddq, axis=1)).max() < 0.5  # no jump: 60 rad/s² turn over within 10 ms at most
-
-
-@pytest.mark.slow
-def test_an_interruption_keeps_the_best() -> None:
-    """Stopped in the middle of the search, the design is the one that as many evaluations give."""
-    task = _task(replace(Wishes(), harmonics=(12,)))
-    original = landscape(task).__class__.value
-    count = 0
-
-    def value(self: object, x: np.ndarray, sharpness: float, weight: float) -> tuple[float, np.ndarray, float]:
-        nonlocal count
-        count += 1
-        if count == 1000:
-            raise Interrupted(2)
-        return original(self, x, sharpness, weight)  # type: ignore[arg-type]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(landscape(task).__class__, "value", value)
-        stopped = design(task, Effort(evaluations=10**6), 5)
-    assert stopped.stopped == 130
-    whole = design(task, Effort(evaluations=999), 5)
-    assert not whole.stopped
-    assert stopped.trajectory.series.cosine.tobytes() == whole.trajectory.series.cosine.tobytes()
 
 
 @pytest.mark.parametrize(("changes", "wishes", "named"), [

@@ -13,11 +13,10 @@ import pytest
 
 from pipelines import estimate_bps
 from pipelines.dynamics.rrr import rigid_body
-from pipelines.errors import InputRejected, RrridError, UsageError
-from pipelines.export.target import Cause
+from pipelines.errors import RrridError, UsageError
 from pipelines.export_model import STAGE, Card, Settings
 from pipelines.io.files import write_log
-from pipelines.io.model_file import read_covariance, write_covariance, write_model
+from pipelines.io.model_file import read_covariance, write_model
 from pipelines.rerender import rerender
 from pipelines.stage import Outcome, Request, run_stage
 from sample_logs.make_model import synthetic_arm
@@ -76,19 +75,6 @@ def test_the_card_names_every_cause_with_its_cost(tmp_path: Path) -> None:
     assert any(check.message.startswith("cogging:2 is lost in urdf; torque error 0.2") for check in outcome.checks)
 
 
-def test_the_covariance_beside_the_model_is_used(tmp_path: Path) -> None:
-    """Its std goes into the links; that of another model is refused."""
-    model = stored(tmp_path)
-    names = [p.name for p in synthetic_arm().base]
-    write_covariance(tmp_path / "covariance.json", names, np.diag(np.full(15, 1e-6)))
-    links = export(tmp_path, Settings(str(model), "urdf")).result.links
-    moment = next(link for link in links if link.name == "mx3")  # p3, about the elbow's axis
-    assert (moment.origin, moment.std) == ("logs", pytest.approx(1e-3))
-    write_covariance(tmp_path / "covariance.json", names[1:], np.eye(14))
-    with pytest.raises(InputRejected, match="of another model"):
-        export(tmp_path, Settings(str(model), "urdf"))
-
-
 def test_a_log_is_replayed_under_both(tmp_path: Path) -> None:
     """C is as good as the model; a URDF loses what its two friction numbers cannot hold."""
     write_log(tmp_path / "waving.h5", controlled_log(1500))
@@ -143,22 +129,6 @@ def test_nothing_is_written_of_what_is_refused(settings: Settings, kind: type[Rr
     assert not (tmp_path / "out").exists()
 
 
-def test_the_model_of_a_folder_of_results_is_taken(tmp_path: Path) -> None:
-    """Of `run` that of extend, else estimate-bps; the terminal and the page say which."""
-    run = tmp_path / "mine"
-    for name in ("estimate-bps", "extend"):
-        (run / name).mkdir(parents=True)
-        write_model(run / name / "model.json", replace(synthetic_arm(), name=name).to_model())
-    for folder, name, said in ((run, "extend", "extend/model.json of the folder mine"),
-                               (run / "extend", "extend", "model.json of the folder extend"),
-                               (run, "estimate-bps", "estimate-bps/model.json of the folder mine")):
-        outcome = export(tmp_path, Settings(str(folder), "json"))
-        assert (outcome.result.model, outcome.report.basis) == (name, (f"model: {said}",))
-        assert f"The model is {said}." in (outcome.folder / "report.html").read_text()
-        if folder != run:
-            shutil.rmtree(folder)
-
-
 def test_what_the_logs_do_not_tell_is_not_known_exactly(tmp_path: Path) -> None:
     """Null instead of a variance of zero, in covariance.json and in the table, and both say what null is."""
     outcome = export(tmp_path, Settings(str(undescribed(tmp_path, std=0.01)), "json"))
@@ -172,36 +142,6 @@ def test_what_the_logs_do_not_tell_is_not_known_exactly(tmp_path: Path) -> None:
     assert [row["std"] is None for row in rows] == untold.tolist()
     for name in ("covariance.json", "rrr-synthetic.json"):
         assert "not told by the logs" in json.loads((outcome.folder / name).read_text())["null"]
-
-
-def test_a_gravity_that_no_urdf_holds_is_a_warning(tmp_path: Path) -> None:
-    """On the terminal, not on the card alone; of a URDF only."""
-    for to, told in (("urdf", True), ("json", False)):
-        found = [check for check in export(tmp_path, Settings("rrr", to)).checks if "gravity is 9.8062 m/s^2" in check.message]
-        assert [check.level for check in found] == ["warn"] * told
-        assert all("set it in the program that reads the URDF, which takes 9.81" in check.message for check in found)
-
-
-@pytest.mark.parametrize(("cause", "version"), [("viscous", "3.3.1"), ("quadratic_drag", "3.7")])
-def test_the_mujoco_that_a_file_needs_is_told(cause: str, version: str, tmp_path: Path) -> None:
-    """Polynomials of damping came with 3.7: in the verdict, in the result, on the card."""
-    arm = replace(synthetic_arm(), friction=(caused(cause, 1, coefficient=0.1),))
-    write_model(tmp_path / "model.json", arm.to_model())
-    outcome = export(tmp_path, Settings(str(tmp_path / "model.json"), "mjcf"))
-    (xml,) = outcome.result.texts.values()
-    assert ('damping="0.1"' in xml) == (version == "3.3.1")
-    assert outcome.json["reader"] == f"MuJoCo {version} or later"
-    assert f"The file needs MuJoCo {version} or later." in outcome.report.verdict
-    assert f"The file needs MuJoCo {version} or later. Exported where" in (outcome.folder / "report.html").read_text()
-
-
-def test_a_folder_without_a_model_says_what_is_wanted(tmp_path: Path) -> None:
-    """Wrong usage, as of a file that is not there."""
-    (tmp_path / "logs").mkdir()
-    with pytest.raises(UsageError, match="RRID-C04 .*logs: a model is wanted") as problem:
-        export(tmp_path, Settings(str(tmp_path / "logs")))
-    assert "estimate-bps, extend or run" in problem.value.remedy
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_model_without_inertia_says_what_to_measure(tmp_path: Path) -> None:
@@ -223,42 +163,3 @@ def undescribed(folder: Path, std: float | None = None, **values: float) -> Path
     body = rigid_body(replace(arm.robot, joints=joints))
     write_model(folder / "model.json", replace(arm, body=body, base=base).to_model())
     return folder / "model.json"
-
-
-def test_links_that_nobody_describes_are_told(tmp_path: Path) -> None:
-    """Where the target needs them: a warning with a remedy, and a sentence of the verdict."""
-    for to, told in (("urdf", True), ("mjcf", True), ("c", False)):
-        outcome = export(tmp_path, Settings(str(undescribed(tmp_path)), to))
-        found = [check for check in outcome.checks if "describes the links of" in check.message]
-        assert ("Nothing describes the links of" in outcome.report.verdict) == bool(found) == told
-        assert all(check.remedy and check.level == "warn" for check in found)
-
-
-def test_assumed_links_that_alone_could_move_are_refused(tmp_path: Path) -> None:
-    """The inertia of the logs is negative, and nobody describes the link: what to measure is said."""
-    model = undescribed(tmp_path, p7=-1.0, p14=-2.0)
-    for to in ("urdf", "mjcf"):
-        with pytest.raises(InputRejected, match="not positive definite") as problem:
-            export(tmp_path, Settings(str(model), to))
-        assert "richer motion" in problem.value.remedy
-        assert not (tmp_path / "out").exists()
-
-
-def test_a_lost_cause_says_its_unit_and_where_else_it_goes(tmp_path: Path) -> None:
-    """Backlash does not show in inverse dynamics; a C function is not told to become one; a slide has N."""
-    model = stored(tmp_path, ("backlash", 2, {"gap": 0.004}))
-    outcome = export(tmp_path, Settings(str(model), "c"))
-    (check,) = [check for check in outcome.checks if check.message.startswith("backlash:2")]
-    assert check.message.endswith("inverse dynamics of this motion does not show it")
-    assert check.remedy == "export to json, which holds every term"
-    cause = Cause("coulomb:1", "lost", cost=np.array([2.0, 0.0, 0.0]))
-    slides = replace(outcome.result, causes=(cause,), units=("N", "N m", "N m"))
-    assert STAGE.checks(slides)[0].message == "coulomb:1 is lost in c; torque error 2 N rms"
-
-
-def test_another_torque_than_was_meant_is_not_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A text that its target reads otherwise is an internal error, and no file."""
-    monkeypatch.setattr("pipelines.export.urdf._rpy", lambda rotation: np.zeros(3))
-    with pytest.raises(RuntimeError, match="another torque"):
-        export(tmp_path, Settings("rrr"))
-    assert not (tmp_path / "out").exists()

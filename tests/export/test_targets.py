@@ -14,10 +14,7 @@ import pytest
 
 from pipelines.dynamics.arm import Arm
 from pipelines.effects import all_effects, find_effect
-from pipelines.effects.base import Effect
-from pipelines.export.c_code import C
 from pipelines.export.states import course, random_states
-from pipelines.export.target import folded
 from sample_logs.make_model import synthetic_arm
 from tests.dynamics.serial_arms import ARMS, physical_links
 from tests.dynamics.serial_arms import Arm as Pinocchio
@@ -134,37 +131,6 @@ def test_a_spring_of_three_powers_is_exact_in_mujoco() -> None:
             assert off(found.torque(states), arm.torque(states)) <= ROUNDING
 
 
-@pytest.mark.parametrize("to", ["mjcf", "c", "json"])
-def test_a_torque_gain_inside_of_other_causes(to: str) -> None:
-    """In the order of the model file, whichever that is."""
-    inner, names = caused("torque_gain", 2, gain_error=0.1), ("torque_offset", "rotor_inertia", "viscous", "quadratic_drag", "spring")
-    values = VALUES | {"spring": {"stiffness": 2.0, "rest_angle": 0.4}}
-    outer = (*(caused(name, 2, **values[name]) for name in names), caused("torque_gain", 2, gain_error=-0.2))
-    arm = replace(synthetic_arm(), friction=(), effects=(inner, *outer))
-    found, states = exported(arm, to), random_states(arm.robot, None)
-    assert {cause.carried for cause in found.held.causes} == {"exactly"}
-    assert off(found.torque(states), arm.torque(states)) <= ROUNDING
-
-
-def test_an_encoder_inside_of_other_causes_in_c() -> None:
-    """What is outside of it sees the motion as logged."""
-    arm = replace(synthetic_arm(), effects=tuple(caused(name, 2, **VALUES[name]) for name in ("encoder_eccentricity", "cogging")))
-    states = random_states(arm.robot, None)
-    assert off(exported(arm, "c").torque(states), arm.torque(states)) <= ROUNDING
-
-
-def test_the_proof_of_a_table_reads_the_numbers_of_its_causes() -> None:
-    """Another number in a row is another torque; two causes at one place are two."""
-    waves = (caused("cogging", 2, order=12.0, amplitude=0.4), caused("cogging", 2, order=7.0, amplitude=0.2))
-    arm = synthetic_arm().extended(*waves)
-    found, states = exported(arm, "json"), random_states(arm.robot, None)
-    assert off(found.torque(states), arm.torque(states)) <= ROUNDING
-    wrong = {name: text.replace("0.4", "0.5") for name, text in found.texts.items()}
-    loaded = found.target.load(wrong, found.held, states)
-    assert loaded is not None
-    assert off(loaded.torque, arm.torque(states)) > 1e-3
-
-
 def test_drives_of_mujoco_clip_and_lag() -> None:
     """They act in a simulation, which inverse dynamics does not show."""
     causes = (caused("torque_saturation", 1, limit=5.0, coefficient=1.0), caused("drive_lag", 2, time_constant=0.004))
@@ -198,31 +164,6 @@ def compiled(folder: Path, texts: dict[str, str], main: str) -> Path:
     return folder / "a.out"
 
 
-LATE = """#include <stdio.h>
-#include "NAME.h"
-int main(void)
-{
-    NAME_state state = {0};
-    const double q[3] = {0}, v[3] = {1.0, 0.0, 0.0}, a[3] = {0};
-    double first[3], later[3];
-    NAME_torque(&state, 0.0, q, v, a, first);
-    state = (NAME_state){0};
-    NAME_torque(&state, 1000.0, q, v, a, later);
-    printf("%d\\n", first[0] == later[0] && state.memory[0] == 0.0);
-    return 0;
-}
-"""
-
-
-def test_c_may_begin_at_any_time(tmp_path: Path) -> None:
-    """The first call has no step: presliding begins unbent at 1000 s as at 0 s."""
-    found = exported(ailing("presliding", APPROXIMATED["presliding"]).extended(
-        caused("presliding", 1, amplitude=1.0, distance=0.02)), "c")
-    name = next(file for file in found.texts if file.endswith(".c"))[:-2]
-    program = compiled(tmp_path, found.texts, LATE.replace("NAME", name))
-    assert subprocess.run([str(program)], capture_output=True, text=True, check=True).stdout == "1\n"
-
-
 SPEED = """#include <stdio.h>
 #include <time.h>
 #include "NAME.h"
@@ -254,21 +195,3 @@ def test_c_compiles_without_a_warning_takes_two_microseconds_and_no_heap(tmp_pat
                 for _ in range(3))
     assert taken <= 2.0
     assert not re.search(r"malloc|calloc|realloc|alloca|free\(", found.texts[f"{name}.c"])
-
-
-def test_mixed_effects_are_known_to_python_alone() -> None:
-    """`folded` leaves an arm whose torque is that of the model."""
-    causes = [caused(name, None, **VALUES[name]) for name in ("payload", "gravity_tilt", "link_length")]
-    arm = synthetic_arm().extended(*causes, caused("torque_gain", 1, gain_error=0.1))
-    states = random_states(arm.robot, None)
-    assert off(folded(arm).torque(states), arm.torque(states)) <= ROUNDING
-    assert C.carry(folded(arm).effects[-1]) is not None
-    assert isinstance(folded(arm).effects[0].effect, Effect)
-
-
-def test_laws_of_friction_see_the_rigid_body_alone() -> None:
-    """As laws of a nominal model, not as causes around it: friction by load knows no other friction then."""
-    laws = [caused(name, joint, **VALUES[name]) for joint in (1, 2, 3) for name in ("coulomb", "stribeck", "load_friction")]
-    arm = replace(synthetic_arm(), friction=(*laws, caused("asymmetric_friction", 2, **VALUES["asymmetric_friction"])))
-    states = random_states(arm.robot, None)
-    assert off(exported(arm, "c").torque(states), arm.torque(states)) <= ROUNDING

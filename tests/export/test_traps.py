@@ -14,8 +14,7 @@ from pipelines.dynamics.arm import Arm
 from pipelines.errors import UsageError
 from pipelines.export.states import random_states
 from pipelines.io.urdf import import_urdf
-from sample_logs.make_model import synthetic_arm
-from tests.export.exported import Exported, caused, exported, off
+from tests.export.exported import Exported, exported, off
 
 # Two turning joints; a test changes a word of it.
 PLAIN = """<robot name="arm">
@@ -121,28 +120,6 @@ def test_a_trap_is_refused(text: str, words: str, tmp_path: Path) -> None:
     assert problem.value.remedy
 
 
-def test_the_tool_frame_is_where_it_was(tmp_path: Path) -> None:
-    """The tip's frame, and its axes, in the exported file and in the original one."""
-    text = CARRIED["fixed link with mass at the tip"]
-    models = [pin.buildModelFromXML(one) for one in (text, *exported(read(text, tmp_path), "urdf").texts.values())]
-    places = []
-    for model in models:
-        data = model.createData()
-        pin.framesForwardKinematics(model, data, np.array([0.3, -0.7]))
-        places.append(data.oMf[model.getFrameId("gripper")].homogeneous)
-    assert np.abs(places[0] - places[1]).max() < 1e-12
-
-
-def test_limits_are_those_of_the_description(tmp_path: Path) -> None:
-    """Position, speed and torque, as Pinocchio reads them; one open end is a far one."""
-    text = PLAIN.replace('lower="-1" upper="1" effort="20"', 'lower="-1" upper="1e12" effort="20"')
-    model = pin.buildModelFromXML(*exported(read(text, tmp_path), "urdf").texts.values())
-    assert model.lowerPositionLimit.tolist() == [-2.0, -1.0]
-    assert model.upperPositionLimit[0] == 1.5
-    assert model.upperPositionLimit[1] >= 1e8
-    assert model.velocityLimit.tolist() == [3.0, 4.0]
-
-
 def test_gravity_of_a_wall_is_turned_into_the_world(tmp_path: Path) -> None:
     """A URDF knows no gravity: the base hangs from the wall, and Pinocchio's own gravity does the rest."""
     arm = read(PLAIN, tmp_path)
@@ -155,21 +132,6 @@ def test_gravity_of_a_wall_is_turned_into_the_world(tmp_path: Path) -> None:
     assert off(np.array(theirs), wall.torque(states)) <= 1e-9
 
 
-def test_names_that_the_export_would_take_are_free(tmp_path: Path) -> None:
-    """A joint called mount and a link called ground, on a wall."""
-    text = PLAIN.replace('name="elbow"', 'name="mount"').replace('"base"', '"ground"').replace('"lower"', '"tip"')
-    arm = read(text, tmp_path)
-    wall = Arm.from_links(replace(arm.robot, gravity=(0.0, 9.81, 0.0)))
-    states = random_states(arm.robot, None)
-    for to in ("urdf", "mjcf"):
-        assert off(exported(wall, to).torque(states), wall.torque(states)) <= 1e-9
-
-
-def test_another_size_of_gravity_is_told() -> None:
-    """The paper's arm has 9.8062 m/s^2."""
-    assert any("gravity is 9.8062" in note for note in exported(synthetic_arm(), "urdf").notes)
-
-
 def test_the_zero_of_the_logs_is_the_zero_of_the_file(tmp_path: Path) -> None:
     """Offsets of the description are in the frames."""
     arm = read(PLAIN, tmp_path)
@@ -179,19 +141,3 @@ def test_the_zero_of_the_logs_is_the_zero_of_the_file(tmp_path: Path) -> None:
     assert any("zero of 'elbow'" in note for note in found.notes)
     assert off(found.torque(states), shifted.torque(states)) <= 1e-9
     assert off(found.torque(states), arm.torque(states)) > 1e-3
-
-
-def test_a_name_that_c_does_not_take(tmp_path: Path) -> None:
-    """A robot called 3-arm."""
-    arm = replace(read(PLAIN, tmp_path), name="3-arm")
-    assert list(exported(arm, "c").texts) == ["arm_3_arm.h", "arm_3_arm.c"]
-    assert exported(arm, "c").torque(random_states(arm.robot, None)).shape == (1000, 2)
-
-
-def test_a_slide_rubs_and_its_rotor_pushes(tmp_path: Path) -> None:
-    """A prismatic joint has kg and N s/m in the same places."""
-    arm = read(CARRIED["prismatic joint"], tmp_path)
-    arm = replace(arm, friction=(caused("viscous", 2, coefficient=3.0),), effects=(caused("rotor_inertia", 2, inertia=0.8),))
-    states = random_states(arm.robot, None)
-    for to in ("urdf", "mjcf", "c", "json"):
-        assert off(exported(arm, to).torque(states), arm.torque(states)) <= 1e-9

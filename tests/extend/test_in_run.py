@@ -5,15 +5,12 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 
-from pipelines import diagnose, extend, run
+from pipelines import diagnose, run
 from pipelines.diagnosis.result import Rejected
-from pipelines.errors import NothingMatched, UsageError
 from pipelines.io.model_file import read_model
 from pipelines.report.run_report import stage_lines
 from pipelines.stage import Request, run_stage
@@ -53,31 +50,3 @@ def test_a_run_names_the_cause_and_writes_the_model(tmp_path: Path) -> None:
     assert all(answer < k for k in sources)  # the answer before its sources
     model = read_model(outcome.folder / "extend/model.json")
     assert [(one.effect, one.joint) for one in model.effects] == [("cogging", 2)]
-
-
-def test_what_happens_once_is_not_offered() -> None:
-    """Somebody touched the arm in one log: the model is extended by the rest alone."""
-    touch: Any = SimpleNamespace(cause="contact", joint=None)
-    ripple: Any = SimpleNamespace(cause="cogging", joint=2)
-    diagnosed: Any = SimpleNamespace(findings=(touch, ripple), verdict="cause")
-    assert [one.effect.name for one in extend._found(diagnosed, "logs")] == ["cogging"]
-    diagnosed.findings = (touch,)
-    with pytest.raises(NothingMatched, match=r"happens once, .*nothing to extend the model by"):
-        extend._found(diagnosed, "logs")
-
-
-@pytest.mark.parametrize(("verdict", "question", "words"), [
-    ("no-fault-found", "what is wrong", "diagnose found nothing wrong: "),
-    ("no-fault-found", "what has changed", "diagnose found nothing that has changed since the reference logs: "),
-    ("unknown", "what is wrong", "diagnose found something wrong, and no cause for it: ")])
-def test_why_there_is_nothing_to_add_is_said_in_words(verdict: str, question: str, words: str) -> None:
-    """By no identifier of a verdict."""
-    diagnosed: Any = SimpleNamespace(findings=(), verdict=verdict, question=question)
-    with pytest.raises(NothingMatched, match=f"{words}there is nothing to extend the model by"):
-        extend._found(diagnosed, "logs")
-
-
-def test_a_stage_that_there_is_not_cannot_be_skipped(tmp_path: Path) -> None:
-    folder = written(tmp_path / "logs", session())
-    with pytest.raises(UsageError, match="diagnose"):
-        run_stage(run.STAGE, Request((folder,), out=tmp_path / "out"), run.Settings(skip=("diagnosis",)))

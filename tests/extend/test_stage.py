@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -13,13 +12,12 @@ import pytest
 
 from pipelines import extend
 from pipelines.dynamics.arm import Arm
-from pipelines.dynamics.named_cause import wanted_cause
 from pipelines.errors import UsageError
 from pipelines.io.files import open_log
 from pipelines.io.model_file import read_model
 from pipelines.simulation import Experiment, simulate
 from pipelines.stage import Outcome, Request, run_stage
-from tests.diagnose.sessions import healthy_again, session, written
+from tests.diagnose.sessions import session, written
 from tests.seeds import rarely
 
 
@@ -46,32 +44,6 @@ def test_what_is_there_is_accepted_and_what_is_not_is_refused(rippled: tuple[Pat
     assert (result.accepted, outcome.exit_code) == (False, 1)
     assert "at joint 1" in outcome.report.verdict
     assert "Now: fitted without what it is extended by." in outcome.report.key_figures.caption
-
-
-@pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="accepted on logs of 2 s")
-def test_a_hump_that_is_not_there_is_refused_beside_a_ripple(
-    rippled: tuple[Path, Outcome[extend.Extension]], tmp_path: Path
-) -> None:
-    result = extended(rippled[0], tmp_path / "out", "cogging:2", "stribeck:2").result
-    assert [(one.cause, one.joint) for one in result.findings] == [("cogging", 2)]
-    assert [(one.cause, one.joint) for one in result.rejected] == [("stribeck", 2)]
-
-
-@pytest.mark.slow
-def test_an_order_of_which_only_a_harmonic_is_there_is_refused_with_what_was_fitted(
-        rippled: tuple[Path, Outcome[extend.Extension]], tmp_path: Path) -> None:
-    """Asked for a third of the waves that there are, the third harmonic takes all: the first wave would be a made-up one."""
-    folder, outcome = rippled
-    true = outcome.result.findings[0].parameters
-    result = extended(folder, tmp_path / "out", f"cogging:2:order={true['order'].value / 3.0}").result
-    assert not result.findings
-    (rejected,) = result.rejected
-    assert "its numbers are impossible: order = " in rejected.reason
-    told = dict(re.findall(r"(\w+) = ([\d.]+)", rejected.reason))
-    assert float(told["order_3"]) == pytest.approx(true["order"].value, rel=0.02)
-    assert float(told["amplitude_3"]) == pytest.approx(true["amplitude"].value, rel=0.1)
-    assert float(told["amplitude"]) < 0.1 * float(told["amplitude_3"])
 
 
 def test_the_gain_is_that_of_diagnose(rippled: tuple[Path, Outcome[extend.Extension]]) -> None:
@@ -124,15 +96,6 @@ def test_a_refused_extension_leaves_no_model_where_one_was(
         read_model(str(place / "model.json"))
 
 
-def test_a_start_is_where_the_search_begins() -> None:
-    """cogging:2:order=18 starts at 18; an amplitude is fitted, whatever it is said to be."""
-    effect, start = wanted_cause("cogging:2:order=18", (True,) * 3)
-    assert (effect.name, effect.joint, start) == ("cogging", 2, {"order": 18.0})
-    assert wanted_cause("gravity_tilt", (True,) * 3)[0].joint is None
-    with pytest.raises(UsageError, match="amplitude is fitted"):
-        wanted_cause("cogging:2:amplitude=0.1", (True,) * 3)
-
-
 @pytest.mark.parametrize(("causes", "words"), [
     ((), "no cause"), (("cogs:1",), "cogging"), (("cogging",), "takes a joint"), (("cogging:7",), "1 to 3"),
     (("coulomb:1",), "has it already"), (("payload",), "name reference logs"),
@@ -145,16 +108,6 @@ def test_causes_that_no_model_takes_are_refused(causes: tuple[str, ...], words: 
     with pytest.raises(UsageError) as refused:
         extended(folder, tmp_path / "out", *causes)
     assert words in str(refused.value).lower()
-
-
-@pytest.mark.slow
-def test_a_load_that_the_reference_logs_do_not_show_is_refused_with_what_they_say(tmp_path: Path) -> None:
-    """They were there to be asked: nobody is told to name some."""
-    folder = written(tmp_path / "logs", (*session(seconds=2.0), *healthy_again(session(seconds=2.0, seed=5))))
-    outcome = extended(folder, tmp_path / "out", "payload")
-    ((cause, reason),) = [(one.cause, one.reason) for one in outcome.result.rejected]
-    assert (cause, outcome.result.findings, outcome.exit_code) == ("payload", (), 1)
-    assert "the base parameters have not moved" in reason
 
 
 @pytest.mark.parametrize(("settings", "words"), [

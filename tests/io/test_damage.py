@@ -138,20 +138,6 @@ def test_a_log_being_written_is_in_use(tmp_path: Path) -> None:
         writer.communicate()
 
 
-def test_a_file_that_differs_from_its_manifest(tmp_path: Path) -> None:
-    """F05: SHA256SUMS or rrrid's own provenance beside a log says what its bytes must be."""
-    import hashlib
-
-    path = tmp_path / "a.h5"
-    write_log(path, small_log())
-    listed = f"{hashlib.sha256(path.read_bytes()).hexdigest()}  a.h5\n"
-    (tmp_path / "SHA256SUMS").write_text(listed)
-    assert open_log(path).log == small_log()
-    (tmp_path / "SHA256SUMS").write_text(listed.translate(str.maketrans("0123", "1230")))
-    with pytest.raises(InputRejected, match=r"RRID-F05 .*sha256 differs from the manifest"):
-        open_log(path)
-
-
 def _write_for_ever(path: Path, logs: tuple[ExperimentLog, ExperimentLog]) -> int:
     """A child that replaces the log without end."""
     with warnings.catch_warnings():

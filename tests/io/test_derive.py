@@ -10,7 +10,7 @@ import pytest
 
 from pipelines.errors import RrridError
 from pipelines.io.files import open_log, write_log
-from pipelines.io.log import Derived, ExperimentLog, derive, derived_by, digest_of, recording
+from pipelines.io.log import ExperimentLog, derive, derived_by, digest_of, recording
 from tests.healthy import changed
 from tests.io.logs import random_log, small_log
 
@@ -35,13 +35,6 @@ def test_the_recording_comes_back_bit_for_bit(ending: str, seed: int, tmp_path: 
     assert derived_by(back, "reconstruct", SETTINGS)
 
 
-def test_either_container_gives_the_same_derived_log(tmp_path: Path) -> None:
-    log = small_log()
-    write_log(tmp_path / "a.h5", richer(log))
-    write_log(tmp_path / "a.parquet", richer(open_log(tmp_path / "a.h5").log))
-    assert open_log(tmp_path / "a.h5").log == open_log(tmp_path / "a.parquet").log == richer(log)
-
-
 def test_nothing_but_the_same_settings_and_the_same_recording_fits() -> None:
     log = richer(small_log())
     assert derived_by(log, "reconstruct", SETTINGS)
@@ -51,33 +44,6 @@ def test_nothing_but_the_same_settings_and_the_same_recording_fits() -> None:
     assert not derived_by(log, "diagnose", SETTINGS)
     assert not derived_by(changed(log, "tau", (0, 0), 7.0), "reconstruct", SETTINGS)
     assert not derived_by(replace(log, sample_time=log.sample_time * 2), "reconstruct", SETTINGS)
-
-
-def test_a_second_derivation_keeps_the_first() -> None:
-    """`estimate-bps` on a log of `reconstruct`: both fit, and the recording is still the first one."""
-    log = small_log()
-    both = derive(richer(log), "estimate-bps", {"blocks": 4}, {"tau_model": log.tau})
-    assert derived_by(both, "reconstruct", SETTINGS)
-    assert derived_by(both, "estimate-bps", {"blocks": 4})
-    assert recording(both) == log
-    again = richer(both, SETTINGS | {"order": 2})
-    assert not derived_by(again, "reconstruct", SETTINGS)
-    assert derived_by(again, "reconstruct", SETTINGS | {"order": 2})
-
-
-def test_what_a_recording_said_of_its_own_origin_is_kept() -> None:
-    """An import that resampled says so under /derived; deriving from it does not lose that."""
-    log = replace(small_log(), derived=Derived("import", "resampled", "f" * 64, "2024-01-01T00:00:00Z"))
-    assert recording(log) is log
-    assert recording(richer(log)) == log
-
-
-@pytest.mark.parametrize("settings", ["", "not JSON", "[1]", "{}", '{"steps": 3}', '{"steps": {"reconstruct": 3}}', "null"])
-def test_another_programs_words_are_not_believed(settings: str) -> None:
-    """Settings that are not ours are no reason to fail, and no reason to trust."""
-    log = replace(richer(small_log()), derived=Derived("reconstruct", settings, "0" * 64, "2024-01-01T00:00:00Z"))
-    assert not derived_by(log, "reconstruct", SETTINGS)
-    assert recording(log) == small_log()
 
 
 def test_a_derived_sample_that_was_changed_in_the_file_is_noticed(tmp_path: Path) -> None:

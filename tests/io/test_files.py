@@ -13,7 +13,6 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from pipelines.batch import find_items
 from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, UsageError
 from pipelines.io.files import find_logs, open_log, write_log
 from pipelines.io.log import Controller, Derived, Signal
@@ -53,21 +52,6 @@ def test_independent_checker_accepts_what_is_written(tmp_path: Path, shared: Pat
     done = subprocess.run([sys.executable, shared / "tools/check_log.py", tmp_path], capture_output=True, text=True, check=False)
     assert done.stdout == "1 checked, 0 faulty\n"
     assert done.returncode == 0
-
-
-def test_layout_is_the_formats(tmp_path: Path) -> None:
-    """Chunks of (65536, 1), gzip-1, shuffle, fletcher32; Parquet with zstd, byte-stream-split and no dictionary."""
-    log = small_log(samples=70_000)
-    write_log(tmp_path / "a.h5", log)
-    write_log(tmp_path / "a.parquet", log)
-    with h5py.File(tmp_path / "a.h5") as file:
-        q = file["signals/q"]
-        assert (q.chunks, q.compression, q.compression_opts, q.shuffle, q.fletcher32) == ((65536, 1), "gzip", 1, True, True)
-    column = pq.ParquetFile(tmp_path / "a.parquet").metadata.row_group(0).column(1)
-    assert column.compression == "ZSTD"
-    assert column.path_in_schema == "q_1"
-    assert "BYTE_STREAM_SPLIT" in column.encodings
-    assert not column.has_dictionary_page
 
 
 @BOTH
@@ -156,15 +140,6 @@ def test_a_writer_refuses_other_units(tmp_path: Path, ending: str, signal: Signa
     assert list(tmp_path.iterdir()) == []
 
 
-def test_another_spelling_of_si_is_read_as_si(tmp_path: Path) -> None:
-    """"Nm" is "N m": the log that comes of it can be written again."""
-    write_log(tmp_path / "a.h5", small_log())
-    with h5py.File(tmp_path / "a.h5", "a") as file:
-        del file.attrs["digest"]
-        file["signals/tau"].attrs["units"] = "Nm"
-    assert open_log(tmp_path / "a.h5").log == small_log()
-
-
 @pytest.mark.parametrize(("key", "value"), [("sample_time", 10**400), ("joint", 10**400), ("period", 5e-324), ("name", "\ud800"),
                                             ("posture", [10**400] * 3)])
 def test_numbers_and_texts_beyond_all_bounds_in_parquet(tmp_path: Path, key: str, value: object) -> None:
@@ -175,12 +150,6 @@ def test_numbers_and_texts_beyond_all_bounds_in_parquet(tmp_path: Path, key: str
     pq.write_table(table.replace_schema_metadata({b"rrrid": json.dumps(about).encode()}), tmp_path / "a.parquet")
     with pytest.raises(InputRejected, match=f"RRID-S20 .*{key}"):
         open_log(tmp_path / "a.parquet")
-
-
-def test_unknown_ending_is_a_usage_error(tmp_path: Path) -> None:
-    """The ending chooses the container; another one is refused with the two that are."""
-    with pytest.raises(UsageError, match=r"RRID-C02 .*\.h5 or \.parquet"):
-        write_log(tmp_path / "a.mat", small_log())
 
 
 def test_find_logs_passes_over_what_is_not_meant(tmp_path: Path) -> None:
@@ -211,39 +180,6 @@ def test_nothing_there_is_said(tmp_path: Path) -> None:
         find_logs([tmp_path / "nowhere"])
 
 
-def test_where_nothing_is_but_links_and_results_they_are_named(tmp_path: Path) -> None:
-    """X11: a folder of links to logs, or of results, is not empty: the error names what was passed over, and what to give."""
-    (tmp_path / "two").mkdir()
-    for name in "ab":
-        (tmp_path / "logs" / name).mkdir(parents=True)
-        (tmp_path / "two" / name).symlink_to(tmp_path / "logs" / name)
-    with pytest.raises(NothingMatched, match=r"RRID-C06 .*no log there; .* here 2\. Give what .*: \S*two/a \S*two/b\."):
-        find_logs([tmp_path / "two"])
-    (tmp_path / "two/b").unlink()
-    write_log(tmp_path / "two/c/logs/c.h5", small_log())
-    (tmp_path / "two/c/provenance.json").write_text('{"tool": "rrrid"}')
-    with pytest.raises(NothingMatched, match=r"here 2\. .*: \S*two/a \S*two/c\."):
-        find_items(tmp_path / "two")
-    assert find_logs([tmp_path / "two/c"])[0]
-
-
-def test_recordings_and_results_are_sought_below(tmp_path: Path) -> None:
-    """But not in hidden folders; a path with a blank is quoted."""
-    (tmp_path / "x").mkdir()
-    (tmp_path / ".hidden/r/logs").mkdir(parents=True)
-    (tmp_path / ".hidden/r/provenance.json").write_text('{"tool": "rrrid"}')
-    (tmp_path / ".hidden/r/run.csv").write_text("t,q")
-    with pytest.raises(NothingMatched, match=r"no log there\. Logs end"):
-        find_logs([tmp_path])
-    (tmp_path / "x/run 1.csv").write_text("t,q")
-    with pytest.raises(NothingMatched, match=r"import --guess '\S*x/run 1\.csv'"):
-        find_logs([tmp_path])
-    (tmp_path / "a result/logs").mkdir(parents=True)
-    (tmp_path / "a result/provenance.json").write_text('{"tool": "rrrid"}')
-    with pytest.raises(NothingMatched, match=r"here 1\. .*: '\S*a result'"):
-        find_logs([tmp_path])
-
-
 def test_no_permission_is_the_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """F13: exit 6. (Root may read everything, so the operating system's answer is set here.)"""
     path = tmp_path / "a.h5"
@@ -251,20 +187,3 @@ def test_no_permission_is_the_environment(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr("os.access", lambda *_: False)
     with pytest.raises(EnvironmentFault, match="RRID-F13 .*permission denied"):
         open_log(path)
-
-
-@BOTH
-def test_a_part_of_a_log_is_the_part(tmp_path: Path, ending: str) -> None:
-    """Only the named signals are read, t, q and tau always among them; their samples are those of the whole."""
-    log = small_log()
-    write_log(tmp_path / f"a{ending}", log)
-    part = open_log(tmp_path / f"a{ending}", only=("q_ref",)).log
-    assert list(part.signals) == ["t", "q", "tau", "q_ref"]
-    assert all(part.signals[name] == log.signals[name] for name in part.signals)
-
-
-def test_a_path_may_be_a_text(tmp_path: Path) -> None:
-    """From Python, as anywhere: open_log("x.h5") and write_log("x.h5", log)."""
-    for name in ("a.h5", "a.parquet"):
-        write_log(str(tmp_path / name), small_log())
-        assert open_log(str(tmp_path / name)).log == small_log()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import signal
 import subprocess
@@ -62,20 +61,6 @@ def test_a_fault_of_the_reader_itself_is_told(tmp_path: Path) -> None:
         guarded(stumble, tmp_path / "a")
 
 
-@pytest.mark.row("F03")
-@pytest.mark.parametrize("work", [_crash, _leave])
-def test_a_crash_is_told_where_nobody_can_wait_for_a_child(tmp_path: Path, work: Callable[[], Answer]) -> None:
-    """SIGCHLD ignored, as a program may inherit it: the system takes the dead child away, and says nothing of its end."""
-    (tmp_path / "a").write_bytes(b"x")
-    before = signal.signal(signal.SIGCHLD, signal.SIG_IGN)
-    try:
-        with pytest.raises(InputRejected, match="RRID-F03 .*ended its process"):
-            guarded(work, tmp_path / "a")
-        assert guarded(lambda: Answer({"n": 1}, {}), tmp_path / "a").about == {"n": 1}
-    finally:
-        signal.signal(signal.SIGCHLD, before)
-
-
 @pytest.mark.row("X05")
 def test_an_endless_text_is_refused(tmp_path: Path) -> None:
     """X05: more than a description can have, without the memory for it."""
@@ -87,17 +72,6 @@ def test_an_endless_text_is_refused(tmp_path: Path) -> None:
         assert tracemalloc.get_traced_memory()[1] < 8 << 20
     finally:
         tracemalloc.stop()
-
-
-@pytest.mark.row("F03")
-@pytest.mark.parametrize("reply", ["[]", "{", "[" * 100_000, json.dumps({"about": {}, "shapes": {"x": [1 << 40]}}),
-                                   json.dumps({"about": {}, "shapes": {"x": [-1]}}), json.dumps({"about": {}, "shapes": 3})])
-def test_what_a_broken_child_says_is_not_allocated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reply: str) -> None:
-    """F03 at once, whatever it says of samples; the parent needs no memory for it."""
-    (tmp_path / "a").write_bytes(b"x")
-    monkeypatch.setattr("pipelines.io.sandbox.json.dumps", lambda value: reply)
-    with pytest.raises(InputRejected, match="RRID-F03 .*makes no sense"):
-        guarded(lambda: Answer({}, {}), tmp_path / "a")
 
 
 @pytest.mark.row("F14")
@@ -142,25 +116,6 @@ def test_samples_of_every_shape_come_as_they_are(tmp_path: Path) -> None:
         assert all(np.array_equal(got[name], sent[name]) and not got[name].flags.writeable for name in sent)
 
 
-def test_relative_paths_are_read_from_where_the_program_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in "ab":
-        write_log(tmp_path / name / "log.h5", small_log(name=name))
-    for name in ("a", "b", "a"):
-        monkeypatch.chdir(tmp_path / name)
-        assert open_log("log.h5").log.name == name
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="counts handles in /proc")
-def test_a_log_that_is_kept_holds_no_file(tmp_path: Path) -> None:
-    """A command has 1000 logs open at once, and the system gives it 1024 handles."""
-    write_log(tmp_path / "a.h5", small_log())
-    open_log(tmp_path / "a.h5")
-    before = len(os.listdir("/proc/self/fd"))
-    logs = [open_log(tmp_path / "a.h5").log for _ in range(20)]
-    assert len(os.listdir("/proc/self/fd")) == before
-    assert logs == [small_log()] * 20
-
-
 def test_logs_are_read_in_any_thread(tmp_path: Path) -> None:
     write_log(tmp_path / "a.h5", small_log())
     found: list[object] = []
@@ -187,8 +142,3 @@ def test_the_child_ends_where_its_program_was_killed(tmp_path: Path) -> None:
                 continue
         return
     pytest.fail("the child lives on")
-
-
-def test_arrow_reserves_no_memory_that_a_child_may_not_use() -> None:
-    code = "import pipelines.io.files, pyarrow; print(pyarrow.default_memory_pool().backend_name)"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "system\n"

@@ -17,8 +17,6 @@ import pytest
 
 from pipelines.errors import InputRejected
 from pipelines.io.files import open_log, write_log
-from pipelines.io.log import Signal
-from pipelines.io.sandbox import Answer, guarded
 from tests.io.logs import small_log
 
 
@@ -122,30 +120,6 @@ def test_not_regular_files_are_refused_without_a_hang(tmp_path: Path) -> None:
         _refused(path, "F12", "not a regular file")
 
 
-def test_other_hdf5_and_parquet_files_are_not_logs(tmp_path: Path) -> None:
-    """F06: a MAT v7.3 file, a table of somebody's, a text: what to do with them is said."""
-    with h5py.File(tmp_path / "a.h5", "w", userblock_size=512) as file:
-        file["x"] = np.zeros(3)
-    _refused(tmp_path / "a.h5", "F06", "import")
-    pq.write_table(pa.table({"t": [1.0]}), tmp_path / "a.parquet")
-    _refused(tmp_path / "a.parquet", "F06", "import")
-    (tmp_path / "b.h5").write_text("t,q\n0,1\n")
-    _refused(tmp_path / "b.h5", "F06", "neither HDF5 nor Parquet")
-
-
-def test_what_a_file_is_is_said_before_what_is_in_it(tmp_path: Path) -> None:
-    """Links first, then format and version, then names: a recording is F06 however it looks, a newer log F11."""
-    with h5py.File(tmp_path / "recording.h5", "w") as file:
-        for i in range(100):
-            file[f"channel {i}"] = np.zeros(3)
-        file.attrs["rig"] = np.zeros(3, "f4,f4")
-    _refused(tmp_path / "recording.h5", "F06", "its format is None.*import")
-    _refused(_edited(tmp_path, lambda f: (f.attrs.__setitem__("format_version", 2), f.create_group("events"))), "F11",
-             "understands version 1")
-    path = _edited(tmp_path, lambda f: (f.attrs.__setitem__("format_version", 2), f.__setitem__("q", h5py.ExternalLink("b", "q"))))
-    _refused(path, "X01", "external link 'q'")
-
-
 def test_a_log_under_a_wrong_name_is_read_by_its_content(tmp_path: Path) -> None:
     """F06: Parquet called .h5 is read, with a word."""
     write_log(tmp_path / "a.parquet", small_log())
@@ -153,17 +127,6 @@ def test_a_log_under_a_wrong_name_is_read_by_its_content(tmp_path: Path) -> None
     opened = open_log(tmp_path / "a.h5")
     assert opened.log == small_log()
     assert [(c.code, c.level) for c in opened.checks] == [("RRID-F06", "warn")]
-
-
-def test_a_crash_or_a_hang_of_the_library_is_one_rejected_file(tmp_path: Path) -> None:
-    """F03: whatever the C library does in the child, the parent names the file and goes on."""
-    path = tmp_path / "a.h5"
-    path.write_bytes(b"x")
-    for work, words in ((lambda: os.kill(os.getpid(), 11), "signal 11"), (lambda: time.sleep(60), "did not end within 1 s")):
-        with pytest.raises(InputRejected, match=f"RRID-F03 .*{words}"):
-            guarded(work, path, seconds=1.0)  # type: ignore[arg-type]
-    with pytest.raises(InputRejected, match="RRID-X05 .*memory"):
-        guarded(lambda: Answer({}, {"x": np.ones(1 << 30)}), path, memory=1 << 28)
 
 
 def test_control_characters_never_reach_a_message(tmp_path: Path) -> None:
@@ -226,14 +189,3 @@ def test_hostile_json_in_parquet(tmp_path: Path) -> None:
     pq.write_table(twice.replace_schema_metadata(good.schema.metadata), path)
     with pytest.raises(InputRejected, match="RRID-S03 .*two columns are called 'q_1'"):
         open_log(path)
-
-
-def test_nan_samples_survive_conversion(tmp_path: Path) -> None:
-    """A recording is shown as it is: undefined samples are kept, bit for bit, for the doctor to name."""
-    log = small_log()
-    q = log.q.copy()
-    q[3, 1], q[4, 2] = np.nan, np.inf
-    broken = small_log(signals={**log.signals, "q": Signal(q, "rad", "q")})
-    for ending in (".h5", ".parquet"):
-        write_log(tmp_path / f"a{ending}", broken)
-        assert open_log(tmp_path / f"a{ending}").log == broken

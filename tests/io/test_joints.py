@@ -11,7 +11,7 @@ import pytest
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.io.files import open_log, write_log
-from pipelines.io.log import Signal, select_joints, with_robot
+from pipelines.io.log import select_joints, with_robot
 from pipelines.io.robot import RobotDescription, parse_robot
 from tests.io.logs import ROBOT_TEXT, small_log
 
@@ -40,10 +40,6 @@ def test_a_choice_reaches_samples_controller_posture_and_joint() -> None:
     assert part.controller.ki is None
 
 
-def test_all_joints_in_order_change_nothing() -> None:
-    assert select_joints(small_log(), (1, 2, 3)) == small_log()
-
-
 @pytest.mark.parametrize(("joints", "words"), [
     ((0, 1), "a log with 3 joints has no joint 0"), ((4,), "a log with 3 joints has no joint 4"),
     ((5, 4), "no joint 5 or 4"), ((1, 1), "'1,1' names a joint twice"),
@@ -52,12 +48,6 @@ def test_a_choice_that_cannot_be_is_refused(joints: tuple[int, ...], words: str)
     """C02: joints that are not there; and a serial arm cannot lose a joint from its description."""
     with pytest.raises(UsageError, match=f"RRID-C02 .*{words}"):
         select_joints(small_log(), joints)
-
-
-def test_the_moving_joint_cannot_be_left_out() -> None:
-    """S02: a friction log of joint 2 says nothing about joints 1 and 3."""
-    with pytest.raises(InputRejected, match="RRID-S02 .*joint 2"):
-        select_joints(small_log(experiment="friction", joint=2), (1, 3), _arm(1, 3))
 
 
 def _six_columns(path: Path, turned: bool = False) -> Path:
@@ -95,11 +85,3 @@ def test_another_robot_replaces_the_logs_own(tmp_path: Path) -> None:
     with pytest.raises(InputRejected, match=r"RRID-S02 .*log has 3 joints, model 2.*--joints"):
         open_log(tmp_path / "a.h5", robot=_arm(1, 2))
     assert open_log(tmp_path / "a.h5", robot=_arm(1, 2), joints=(1, 2)).log.n_joints == 2
-
-
-def test_one_joint_is_one_column(tmp_path: Path) -> None:
-    log = small_log(controller=None)
-    part = with_robot(select_joints(log, (2,), _arm(2)), _arm(2))
-    write_log(tmp_path / "a.h5", part)
-    assert open_log(tmp_path / "a.h5").log == part
-    assert part.signals["q"] == Signal(log.q[:, 1:2], "rad", log.signals["q"].long_name)

@@ -12,9 +12,7 @@ from pipelines.io.sessions import (
     SeveralSessions,
     apart,
     called,
-    check_alike,
     of_one_session,
-    refuse_mixed,
 )
 from tests.io.logs import ROBOT_TEXT, small_log
 
@@ -48,34 +46,6 @@ def test_what_the_user_named_for_a_role_goes_with_every_day() -> None:
     assert list(together(first, second, named=(third,)).values()) == [{"a", "c"}, {"b", "c"}]
 
 
-def test_a_day_that_only_judges_goes_with_the_day_it_judges() -> None:
-    """Fitted on Monday and judged on Tuesday: by itself Tuesday says nothing. Whoever fits on both days has two sessions."""
-    monday, tuesday = opened("a", recorded=DAY), opened("b", recorded=NEXT, role="validate")
-    assert list(together(monday, tuesday).values()) == [{"a", "b"}]
-    assert list(together(tuesday, opened("c", recorded=LATER)).values()) == [{"b", "c"}]
-    both = together(monday, tuesday, opened("c", recorded=LATER), opened("d", recorded=LATER, role="validate"))
-    assert list(both.values()) == [{"a", "b"}, {"c", "d"}]
-    assert list(together(tuesday, opened("d", recorded=LATER, role="validate")).values()) == [{"b"}, {"d"}]
-
-
-def test_another_day_that_judges_is_said() -> None:
-    """A year later, and told as an error of the model otherwise. One that the user named to judge is no news."""
-    monday, tuesday = opened("a", recorded=DAY), opened("b", recorded=LATER, role="validate")
-    (said,) = check_alike(Inputs((monday, tuesday)))
-    assert (said.code, said.level, said.where) == ("RRID-S21", "warn", "rrr-tue 2026-03-02")
-    assert "2026-05-18" in said.message
-    assert not check_alike(Inputs((monday, tuesday), named=frozenset([tuesday.path])))
-    assert not check_alike(Inputs((monday, opened("c", recorded=DAY, role="validate"))))
-
-
-@pytest.mark.parametrize("role", ["identify", "validate"])
-def test_a_log_that_tells_no_day_is_of_no_other(role: str) -> None:
-    """Beside one day it is of that; beside two nobody knows of which."""
-    undated, first, second = opened("a", recorded=None, role=role), opened("b", recorded=DAY), opened("c", recorded=NEXT)
-    assert list(together(undated, first).values()) == [{"b", "a"}]
-    assert list(together(undated, first, second).values()) == [{"a"}, {"b"}, {"c"}]
-
-
 def test_a_robot_of_one_day_is_called_by_its_name() -> None:
     """Without its date, as long as it has no other."""
     a, b, later = (opened("a", robot_name="arm-a", recorded=DAY), opened("b", robot_name="arm-b", recorded=DAY),
@@ -84,15 +54,6 @@ def test_a_robot_of_one_day_is_called_by_its_name() -> None:
     assert one is not None
     assert one.logs == (a,)
     assert called("arm-a", apart((a, b, later))) is None
-
-
-def test_a_named_log_of_another_robot_stays_apart() -> None:
-    assert len(together(opened("a"), named=(opened("b", robot_name="arm-b"),))) == 2
-
-
-def test_a_plan_is_no_day_of_its_own() -> None:
-    """A trajectory beside the logs that were recorded along it was never recorded."""
-    assert list(together(opened("a", recorded=DAY), opened("plan", origin="planned", recorded=None)).values()) == [{"a", "plan"}]
 
 
 @pytest.mark.parametrize(("times", "sessions"), [
@@ -119,42 +80,3 @@ def test_several_robots_are_refused_with_the_names_of_all() -> None:
     assert refused.value.exit_code == 2
     assert refused.value.as_dict()["sessions"] == list(refused.value.names)
     assert of_one_session(Inputs((b,))).logs == (b,)
-
-
-def test_the_list_of_many_days_is_complete() -> None:
-    logs = [opened(str(i), recorded=f"2026-03-{i:02d}T09:00:00Z") for i in range(1, 29)]
-    with pytest.raises(SeveralSessions) as refused:
-        of_one_session(Inputs(tuple(logs)))
-    assert all(f"rrr-tue 2026-03-{i:02d}" in str(refused.value) for i in range(1, 29))
-
-
-def test_each_of_several_folders_is_of_one_session_by_itself() -> None:
-    """Commands that take each log by itself accept the folders of two days, and logs that were named one by one."""
-    monday, tuesday = opened("a", "monday", recorded=DAY), opened("b", "tuesday", recorded=NEXT)
-    refuse_mixed(Inputs((monday, tuesday)), (Path("monday"), Path("tuesday")))
-    refuse_mixed(Inputs((monday, tuesday)), ())
-    with pytest.raises(SeveralSessions):
-        refuse_mixed(Inputs((monday, opened("c", "monday", recorded=NEXT))), (Path("monday"),))
-
-
-def test_reference_logs_are_of_both_days_and_none_by_themselves() -> None:
-    """Of two later days each is compared with what was before; that is no third session."""
-    before = opened("r", recorded=DAY, role="reference")
-    with pytest.raises(SeveralSessions) as refused:
-        of_one_session(Inputs((before, opened("a", recorded=NEXT), opened("b", recorded=LATER))))
-    assert refused.value.names == ("rrr-tue 2026-03-03", "rrr-tue 2026-05-18")
-    later = (before, opened("a", recorded=LATER))
-    assert of_one_session(Inputs(later)).logs == later
-
-
-def test_two_folders_that_nothing_tells_apart_are_said() -> None:
-    """Two imports of one recipe have logs of the same names: they may be of two machines, and nothing in them says so."""
-    (said,) = check_alike(Inputs((opened("run", "left"), opened("run", "right"), opened("more", "right"))))
-    assert (said.code, said.level) == ("RRID-S21", "warn")
-    assert "left, right" in said.message
-
-
-@pytest.mark.parametrize("other", [{"robot_name": "arm-b"}, {"recorded": NEXT}, {"role": "reference"}, {"name": "walk"}])
-def test_folders_of_one_session_are_no_news(other: dict[str, object]) -> None:
-    """Folders by kind, by day, by robot, before and after: all in order, and nothing is said."""
-    assert not check_alike(Inputs((opened("run", "left"), opened(**({"name": "run", "folder": "right"} | other)))))  # type: ignore[arg-type]

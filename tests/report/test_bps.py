@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -84,71 +83,3 @@ def test_names_from_logs_are_inert(result: Result) -> None:
     named = replace(result, joints=(hostile, *result.joints[1:]),
                     courses=tuple(replace(c, name=hostile) for c in result.courses))
     assert "<script>" not in page(named)
-
-
-def test_estimates_that_do_not_settle_are_said(result: Result) -> None:
-    """A change that noise makes, and the same for a parameter five standard deviations away at half of the samples."""
-    def said(one: Result) -> str:
-        return " ".join(text for section in bps_report(one).sections for text in section.text)
-
-    assert "may be chance" in said(result)
-    half = len(result.convergence) // 2
-    spread = np.sqrt(np.square(result.convergence_std[half, 2]) - np.square(result.convergence_std[-1, 2]))
-    moving = result.convergence.copy()
-    moving[half, 2] = moving[-1, 2] + 5.0 * spread
-    contradicted = replace(result, convergence=moving)
-    assert f"moves {result.parameters[2].name} most, by 5.0 standard deviations: more than noise" in said(contradicted)
-    assert bps_report(contradicted).tone == "attention"
-    assert "two halves of the samples contradict each other" in bps_report(contradicted).verdict
-
-
-def test_the_torque_that_is_drawn_is_the_torque_that_was_fitted(result: Result) -> None:
-    """After the low-pass: what is left in the figure has the root mean square of the table, and nothing is aliased."""
-    (course,) = result.courses
-    fitted = (course.t > 0.1) & (course.t < course.t[-1] - 0.1)  # the ends, known badly, are not fitted
-    inside = course.left[fitted & ~((course.t > 3.7) & (course.t < 5.4))]  # nor joint 1 while dry friction holds it
-    np.testing.assert_allclose(np.sqrt(np.nanmean(np.square(inside), axis=0)), result.torque_rms["identify"], rtol=0.1)
-    np.testing.assert_allclose(course.left, course.measured - course.model, atol=1e-9)
-
-
-def test_a_model_that_explains_nothing_is_called_bad(result: Result) -> None:
-    """Nine tenths of the torque left over: no good figure is made of it, and every joint that stands out is named."""
-    poor = bps_report(replace(result, relative_error={"identify": 0.9, "validate": 0.94}))
-    assert poor.tone == "bad"
-    assert "does not explain these logs" in poor.verdict
-    assert "with an error of 94 % (rms)" in poor.verdict
-    uneven = replace(result, relative_error={"identify": 0.05, "validate": 0.14},
-                     torque_rms={**result.torque_rms, "validate": (1.0, 39.0, 62.0)},
-                     torque_signal_rms={**result.torque_signal_rms, "validate": (100.0, 100.0, 100.0)})
-    assert f"{result.joints[2]} 62 %, {result.joints[1]} 39 %" in bps_report(uneven).verdict
-
-
-def test_a_motion_that_contradicts_itself_alone_does_not_contradict_the_parameters(result: Result) -> None:
-    """All parameters alike, and an energy that does not close: said as what it is."""
-    assert result.balance is not None
-    open_ = replace(result.balance, agree=False, closure=0.0041, apart=tuple(np.full(len(result.balance.apart), 0.3)),
-                    delay=0.0, delay_std=1e-5, deviate=0.5)
-    words = " ".join(text for section in bps_report(replace(result, balance=open_)).sections for text in section.text)
-    assert "finds the same parameters but cannot confirm them" in words
-    assert "does not confirm" not in words
-
-
-@pytest.mark.slow
-def test_described_links_that_differ_are_named(result: Result) -> None:
-    """One described value ten standard deviations from its estimate, the others equal to theirs."""
-    equal = tuple(replace(p, known=p.value) for p in result.parameters)
-    first = equal[0]
-    assert first.value is not None
-    assert first.std is not None
-    off = replace(result, parameters=(replace(first, known=first.value + 10.0 * first.std), *equal[1:]))
-    assert f"1 of {len(equal)} values of the described links" in page(off)
-    assert f"All {len(equal)} values of the described links" in page(replace(result, parameters=equal))
-
-
-def test_nothing_is_told_by_its_key(result: Result) -> None:
-    """Parameters by their cause in words, powers and comparisons as they are written by hand."""
-    page = bps_report(result)
-    cells = [str(cell) for section in page.sections for table in section.tables for row in table.rows for cell in row]
-    told = [*cells, *(text for section in page.sections for text in section.text)]
-    assert "Coulomb friction at joint 1, level" in cells
-    assert not [text for text in told if re.search(r"[a-z]:\d|\d:[a-z]|\w\^\d|sqrt|>=|\de[+-]\d", text)]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,14 +13,10 @@ from hypothesis.extra.numpy import arrays
 
 from pipelines.errors import Check
 from pipelines.report.figures import (
-    draw_joint_signals,
     envelope,
     interval_figure,
-    joint_axes,
     joint_signal_figure,
-    merge_spans,
     timeline_figure,
-    true_spans,
 )
 from pipelines.report.render import render_report
 from pipelines.report.report import Figure, Report, Section
@@ -62,33 +57,12 @@ def test_an_envelope_draws_no_line_across_a_gap(x: np.ndarray, points: int) -> N
             assert np.isfinite(x[int(t0):int(t1) + 1]).all()
 
 
-@given(arrays(np.float64, st.integers(0, 200), elements=st.sampled_from([1.0, np.nan])), st.integers(2, 60))
-def test_a_lone_sample_between_gaps_is_given_as_a_line(x: np.ndarray, points: int) -> None:
-    small = envelope(np.arange(x.size, dtype=float), x, points)[1]
-    runs = np.flatnonzero(np.diff(np.concatenate(([False], np.isfinite(small), [False])).astype(int))).reshape(-1, 2)
-    if np.isnan(x).any():
-        assert all(stop - start >= 2 for start, stop in runs)
-
-
-def test_a_short_signal_stays_as_it_is() -> None:
-    t = np.arange(100.0)
-    assert all(np.array_equal(a, b) for a, b in zip(envelope(t, t**2), (t, t**2), strict=True))
-
-
 def test_three_million_samples_become_a_few_points() -> None:
     x = np.zeros(3_000_000)
     x[1_234_567] = 7.0
     t, small = envelope(np.arange(x.size) / 5000.0, x)
     assert small.size <= 1300
     assert t[small == 7.0] == pytest.approx([1_234_567 / 5000.0])
-
-
-def test_spans_of_a_mask_and_their_union() -> None:
-    t = np.arange(8.0)
-    spans = true_spans(t, np.array([1, 1, 0, 1, 0, 0, 0, 1], bool))
-    assert spans == [(0.0, 1.0), (3.0, 3.0), (7.0, 7.0)]
-    assert merge_spans(spans, 2.5) == [(0.0, 3.0), (7.0, 7.0)]
-    assert merge_spans([(2.0, 1.0), (np.nan, 3.0)], 0.0) == [(1.0, 2.0)]
 
 
 TIMES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
@@ -120,23 +94,6 @@ def test_a_log_of_hardly_a_sample_can_be_drawn(samples: int) -> None:
     assert "<path" in drawn(interval_figure("b", "", t, 1e-3))
     assert "<path" in drawn(timeline_figure("c", "", (0.0, 0.0), []))
     assert "<path" in drawn(timeline_figure("d", "", (0.0, 0.0), [("gap", [(0.0, 0.0)])]))
-
-
-def test_a_long_log_makes_a_modest_figure() -> None:
-    rng = np.random.default_rng(1)
-    x = rng.normal(size=(300_000, 7))
-    svg = drawn(joint_signal_figure("noise", "", np.arange(300_000) / 5000.0, x, "N m", flagged=x > 2.5))
-    assert len(svg) < 450_000
-
-
-def test_two_signals_stand_side_by_side() -> None:
-    t = np.arange(50) / 100.0
-
-    def draw(drawing: Any) -> None:
-        for part, unit in zip(drawing.subfigures(1, 2), ("rad", "N m"), strict=True):
-            draw_joint_signals(joint_axes(part, 2), t, np.zeros((50, 2)), unit, quantity="q", flagged=t > 0.4)
-
-    assert "<path" in drawn(Figure("pair", "", draw))
 
 
 def test_the_worst_check_comes_first_and_sets_the_tone() -> None:

@@ -7,17 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.diagnosis.result import BeforeAfter, Diagnosis, Extension, Gain, ResidualRms
-from pipelines.estimation.model_fit import TorqueGain
+from pipelines.diagnosis.result import Diagnosis, ResidualRms
 from pipelines.estimation.residual_analysis import Curve, Evidence
-from pipelines.excitation.constraints import Limit
-from pipelines.report.diagnosis_finding import gain_table
-from pipelines.report.diagnosis_report import torque_errors
-from pipelines.report.words import Units, each, unit_of, units_in
+from pipelines.report.words import each, units_in
 
 NOTHING: Any = {field.name: None for field in fields(Evidence)}
 RMS = ResidualRms(np.ones(2), np.ones(2), 0.5 * np.ones(2))
-NOW = ResidualRms(np.ones(2), 0.5 * np.ones(2), 0.5 * np.ones(2))
 
 
 def diagnosis(*units: str) -> Diagnosis:
@@ -35,25 +30,3 @@ def test_a_diagnosis_says_which_joints_slide() -> None:
         assert (units.torque, units.thousandths) == (torque, small)
     assert [units.at(joint).torque for joint in (1, 2, None)] == ["N", "N m", "N or N m"]
     assert each("rad or m", "/s") == "rad/s or m/s"
-
-
-def test_an_extension_says_it_also_where_it_has_no_model() -> None:
-    """The newtons that a slide's refused cause leaves are no newton metres."""
-    whole: Any = {field.name: None for field in fields(Extension)}
-    assert units_in(Extension(**(whole | {"revolute": (False, True)}))).torque == "N or N m"
-
-
-def test_headings_bear_the_units_of_the_arm() -> None:
-    """Torque errors and gains of a gantry in N and mm, of an arm in N m and mrad: no heading has the other's."""
-    gain = Gain(TorqueGain(np.ones(2), np.ones(2), np.zeros((2, 2))), BeforeAfter(np.ones(2), np.ones(2)), "closed-loop", None)
-    for turning, torque, small in (((False, False), "[N]", "[mm]"), ((True, True), "[N m]", "[mrad]")):
-        errors = torque_errors(RMS, NOW, (50.0, 50.0), RMS.noise_floor, "noise", "", Units(turning)).columns
-        gains = gain_table(gain, "", Units(turning)).columns
-        assert [head.count(torque) for head in (*errors[1:4], *gains[1:4])] == [1] * 6
-        assert [head.count(small) for head in gains[4:]] == [1, 1]
-
-
-def test_a_designed_motion_says_it_by_its_limits() -> None:
-    limits = [Limit("position", 1, -1.0, 1.0, "m"), Limit("position", 2, -1.0, 1.0, "rad"), Limit("tip x", None, 0.0, 1.0, "m")]
-    assert unit_of(limits, "position") == "m or rad"
-    assert unit_of(limits, "acceleration") == "rad/s^2"

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
-import itertools
 from dataclasses import fields
-from typing import Any
 
 import numpy as np
-import pytest
-from matplotlib.figure import Figure as Drawing
 
-from pipelines.diagnosis.result import Diagnosis, Extension, Finding, Gain, ResidualRms, TipError
+from pipelines.diagnosis.result import Diagnosis, Extension, Finding, Gain, ResidualRms
 from pipelines.errors import Check
 from pipelines.estimation.model_fit import TorqueGain
-from pipelines.io.model_file import ModelFile
 from pipelines.report.report import Figure, Report, Section, Table
 from pipelines.report.run_report import Result, Step, run_report, stage_lines, stages_section
 
@@ -36,14 +30,6 @@ def test_forty_logs_make_no_report_of_a_hundred_pages() -> None:
         assert 1 <= len(drawn) <= 4
         assert all(section.tables for section in own)
         assert all(f"rrrid {name}" in " ".join(section.text) for section in own[len(drawn):])
-
-
-def test_a_stage_asked_for_alone_shows_all_it_has() -> None:
-    """One stage, by --skip of the others: nothing is left out; nor is a first log with many figures."""
-    alone = run_report(Result((Step("reconstruct", 0, object(), of_logs(8, 4), ()),)))
-    assert sum(len(section.figures) for section in alone.sections) == 32
-    steps = tuple(Step(name, 0, object(), of_logs(1, 8), ()) for name in ("inspect", "reconstruct"))
-    assert sum(len(section.figures) for section in run_report(Result(steps)).sections) == 16
 
 
 NOMINAL, RIPPLED, CARRYING, BARE = (np.array([error, 0.1]) for error in (0.5, 0.2, 0.18, 0.9))
@@ -83,43 +69,11 @@ def test_every_gain_counts_from_a_line_above_it() -> None:
         assert [line.step.startswith("+") for line in lines].count(True) == len(findings)
 
 
-def test_a_load_alone_is_told_beside_the_arm_without_it() -> None:
-    """The model fitted to the loaded arm is no step towards the load: it is no line of the ledger."""
-    bare, load, extended = stage_lines(told(LOAD, was=BARE))
-    assert bare.step.endswith("without payload at the tip")
-    assert (bare.rms, load.before, extended.before) == (tuple(BARE),) * 3
-
-
-def test_findings_that_build_on_one_another_stand_in_that_order() -> None:
-    """The drag was found beside the cogging, and is the stronger: the cogging comes first all the same."""
-    steps = [line.step for line in stage_lines(told(DRAG, RIPPLE))]
-    assert steps[:3] == ["rigid body and friction, as diagnose fits them", "+ cogging at joint 2", "+ quadratic drag at joint 1"]
-
-
-def test_no_line_joins_the_steps_of_two_stages() -> None:
-    """The model of extend without its cause is no step back from what diagnose found."""
-    lines = stage_lines(told(RIPPLE, was=2.0 * NOMINAL))
-    (section,) = stages_section(lines)
-    drawing = Drawing()
-    section.figures[0].draw(drawing)
-    for drawn in drawing.axes[0].lines:
-        heights = np.asarray(drawn.get_ydata(), dtype=np.float64)
-        joined = [(int(a), int(b)) for a, b in itertools.pairwise(heights) if np.isfinite(a + b)]
-        assert joined == [(k - 1, k) for k in range(1, len(lines)) if lines[k].stage == lines[k - 1].stage]
-
-
 def test_what_a_gain_is_a_share_of_stands_above_it() -> None:
     """Of the error here, of its square in the ledger of hypotheses: a reader lays the two side by side."""
     (section,) = stages_section(stage_lines(told(RIPPLE)))
     assert "gain in rms [%]" in section.tables[0].columns
     assert "in the square" in section.text[0]
-
-
-def test_the_ledger_writes_the_tip_as_the_verdict_does() -> None:
-    """0.125 mm is 0.125 mm in every line, not 0.13 in one and 0.12 in the next."""
-    tips = dataclasses.replace(RIPPLE.gain, tip_error_rms=TipError(1.2509e-4, 1.86e-5))
-    (section,) = stages_section(stage_lines(told(dataclasses.replace(RIPPLE, gain=tips))))
-    assert "0.125 → 0.0186" in [row[-1] for row in section.tables[0].rows]
 
 
 def refused(stage: str, remedy: str) -> Step:
@@ -141,12 +95,6 @@ def test_each_refusal_is_told_once_and_nothing_that_follows_from_it() -> None:
     assert [row[0] for row in next(s for s in said.sections if s.title == "Stages").tables[0].rows] == [s.name for s in steps]
 
 
-def test_what_is_not_in_order_is_told_where_nothing_was_refused() -> None:
-    steps = (Step("inspect", 1, object(), Report("Log doctor", "All should be looked at.", "attention"), ()),
-             Step("reconstruct", 0, object(), Report("Motion", "Known.", "good"), ()))
-    assert run_report(Result(steps)).verdict == "All should be looked at."
-
-
 def test_a_log_that_cannot_be_used_is_named_before_the_answer() -> None:
     """Nothing is wrong, as far as the other logs say."""
     check = Check.of("T01", "reject", "its clock runs backwards", where="a.h5", remedy="record again")
@@ -155,35 +103,3 @@ def test_a_log_that_cannot_be_used_is_named_before_the_answer() -> None:
     steps = (Step("inspect", 3, object(), Report("Log doctor", "The log cannot be used.", "bad"), (check,)),
              Step("diagnose", 0, bare, Report("Diagnosis", "Nothing is wrong.", "good"), ()))
     assert run_report(Result(steps)).verdict.startswith("Left out as unusable: a.h5 (its clock runs backwards). Nothing is wrong.")
-
-
-@pytest.mark.parametrize(("stages", "said"), [
-    ({"inspect": "attention"}, "With remarks: inspect; see the stages."),
-    ({"inspect": "attention", "fit-friction": "bad", "frf": "attention"},
-     "Not in order: fit-friction; see the stages. With remarks: inspect and frf; see the stages.")])
-def test_beside_a_diagnosis_the_other_stages_are_named_alone(stages: dict[str, Any], said: str) -> None:
-    """The headline is about the arm; their verdicts are in the table of stages."""
-    rms = ResidualRms(NOMINAL, NOMINAL, NOMINAL)
-    empty = {field.name: None for field in fields(Diagnosis)} | {"findings": (), "residual_rms": rms}
-    bare = Diagnosis(**empty)  # type: ignore[arg-type]
-    steps = (*(Step(name, 0, object(), Report(name, "Waist: a long story.", tone), ()) for name, tone in stages.items()),
-             Step("reconstruct", 0, object(), Report("Motion", "Known.", "good"), ()),
-             Step("diagnose", 0, bare, Report("Diagnosis", "Cogging.", "bad"), ()))
-    told = run_report(Result(steps))
-    assert told.verdict == f"Cogging. {said}"
-    table = next(section for section in told.sections if section.title == "Stages").tables[0]
-    assert "Waist: a long story." in [row[1] for row in table.rows]
-
-
-def test_the_extended_model_of_the_key_figures_is_told_from_the_file() -> None:
-    """They are those of diagnose; the residual of extend's model.json is stated below, where there is one."""
-    table = Table(("joint", "torque error now [N m]", "extended [N m]"), ((1, 0.5, 0.18), (2, 0.1, 0.1)), "Of what was held out.")
-    diagnosed, extended = told(RIPPLE)
-    diagnosed = dataclasses.replace(diagnosed, report=Report("", "", key_figures=table))
-    assert run_report(Result((diagnosed, extended))).key_figures == table
-    model = ModelFile("arm", "", ())
-    anew = dataclasses.replace(extended, result=dataclasses.replace(extended.result, model=model, joints=("a", "b")))
-    shown = run_report(Result((diagnosed, anew))).key_figures
-    assert shown is not None
-    assert (shown.rows, shown.caption.startswith("Of what was held out. ")) == (table.rows, True)
-    assert "that of extend, in its model.json, leaves 0.18, 0.1 N m" in shown.caption

@@ -6,16 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from pipelines.report.style import (
     figure_style,
     format_number,
-    format_unit,
     log_ticks,
-    printable,
-    to_one_place,
     with_std,
 )
 
@@ -36,33 +31,6 @@ def test_format_number(value: float | None, text: str) -> None:
     (-41.37, 0.5, "−41.37 ± 0.50"), (5.0e7, 1e5, "(5.000 ± 0.010) × 10⁷"), (1.0, 1e-14, "1 ± 1 × 10⁻¹⁴")])
 def test_with_std(value: float | None, std: float | None, text: str) -> None:
     assert with_std(value, std) == text
-
-
-@given(st.floats(), st.one_of(st.floats(min_value=0.0), st.just(math.nan)))
-def test_every_pair_of_numbers_has_a_short_text(value: float, std: float) -> None:
-    assert 0 < len(format_number(value)) <= 20
-    assert 0 < len(with_std(value, std)) <= 50
-
-
-@given(st.floats(-1e5, 1e5, allow_subnormal=False))
-def test_four_digits_are_kept(value: float) -> None:
-    text = format_number(value).replace("−", "-").replace("\u202f", "")
-    for sign, plain in zip("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789", strict=True):
-        text = text.replace(sign, plain)
-    assert float(text.replace(" × 10", "e")) == pytest.approx(value, rel=5.1e-4, abs=1e-300)
-
-
-def test_units_and_texts() -> None:
-    assert [format_unit(u) for u in ("rad/s^2", "rad/s^4", "N m^-1")] == ["rad/s²", "rad/s⁴", "N m⁻¹"]
-    assert printable("a\x1b[31m\udc80\nb") == "a[31m? b"
-
-
-def test_a_row_of_errors_is_rounded_at_one_place() -> None:
-    """Three digits of the largest, two of the smallest; what is none stays none."""
-    assert to_one_place([0.08783, 0.23728, 0.009995]) == [0.0878, 0.2373, 0.0100]
-    assert to_one_place([0.0, math.nan, 0.0]) == [0.0, None, 0.0]
-    assert to_one_place([1234.5, 99.4]) == [1234.0, 99.0]
-    assert to_one_place([]) == []
 
 
 @pytest.mark.parametrize(("ends", "least"), [((0.3, 8.0), 2), ((0.2, 0.8), 2), ((1.1, 4.4), 2), ((3.0, 70.0), 2), ((1.0, 1e3), 4),

@@ -60,24 +60,6 @@ def test_no_result_is_lost_to_a_report(results: Path, tmp_path: Path) -> None:
     assert contents(tmp_path / "new")["report.html"] == contents(results / "inspect")["report.html"]
 
 
-def test_the_root_is_no_place_for_a_report(results: Path) -> None:
-    """C05: it is refused as any folder that holds the result."""
-    with pytest.raises(UsageError, match="C05"):
-        rerender(results / "inspect", Path("/"))
-
-
-@pytest.mark.slow
-def test_what_was_taken_away_since_is_not_missed(results: Path, tmp_path: Path) -> None:
-    """Derived logs deleted to save room: the report needs none of them."""
-    shutil.copytree(results / "run", tmp_path / "a")
-    shutil.rmtree(tmp_path / "a/figures")
-    (tmp_path / "a/report.html").unlink()
-    (tmp_path / "a/result.h5").unlink(missing_ok=True)
-    (tmp_path / "a/.cache/drawing.json").unlink()
-    rerender(tmp_path / "a")
-    assert contents(tmp_path / "a")["report.html"] == contents(results / "run")["report.html"]
-
-
 def refused(folder: Path) -> RrridError:
     before = contents(folder)
     with pytest.raises(RrridError) as problem:
@@ -106,22 +88,6 @@ def test_an_edited_report_is_kept(results: Path, tmp_path: Path) -> None:
     assert refused(tmp_path / "a").code == "RRID-C05"
     rerender(tmp_path / "a", force=True)
     assert contents(tmp_path / "a") == contents(results / "inspect")
-
-
-@pytest.mark.parametrize("told", [{"outputs": 3}, {"inputs": 3}, "../elsewhere/notes.txt", "/etc/hostname"])
-def test_a_provenance_that_is_none_leads_nowhere(results: Path, tmp_path: Path, told: dict[str, int] | str) -> None:
-    """F05, X11: other kinds of JSON, and outputs that lie elsewhere; nothing is written beside the folder."""
-    shutil.copytree(results / "inspect", tmp_path / "a/b/result")
-    path = tmp_path / "a/b/result/provenance.json"
-    about = json.loads(path.read_text())
-    path.write_text(json.dumps(about | (told if isinstance(told, dict) else {"outputs": about["outputs"] | {told: ""}})))
-    (tmp_path / "a/b/elsewhere").mkdir()
-    (tmp_path / "a/b/elsewhere/notes.txt").write_text("mine")
-    before = contents(tmp_path)
-    with pytest.raises(RrridError) as problem:
-        rerender(tmp_path / "a/b/result")
-    assert problem.value.exit_code in (2, 3)
-    assert contents(tmp_path) == before
 
 
 def test_another_versions_result_is_refused(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.body import Motion
 from pipelines.io.log import Array, Controller
 from pipelines.simulation import Noise, Plant, run
-from pipelines.simulation.closed_loop import _draws, run_together
+from pipelines.simulation.closed_loop import run_together
 from tests.simulation.arms import GAIN, KD, KP, TS, experiment, rrr, rrr_friction, waving
 from tests.simulation.pinocchio_loop import Loop, TransferObserver
 
@@ -154,14 +154,6 @@ def test_open_loop_moves_one_joint_and_holds_the_others() -> None:
     agree(Controller("open-loop", KP, KD, velocity="backward-difference"), backward_pd(change), tau=torque, driven=driven)
 
 
-def test_encoder_and_command_count_in_steps() -> None:
-    """What is logged are whole steps of the encoder and of the command, half a step from the truth at most."""
-    found = run(Plant.of(rrr().arm), experiment(plain(torque_resolution=np.full(3, 0.02)), 300, resolution=np.full(3, 1e-5)), 4)
-    for values, step in ((found.q, 1e-5), (found.tau, 0.02)):
-        np.testing.assert_allclose(values / step, np.round(values / step), atol=1e-6)
-    assert 0.4e-5 < np.abs(found.q - found.true_q).max() <= 0.5001e-5
-
-
 def test_noise_is_each_replicas_own() -> None:
     """A seed gives the same run alone, among others and without arrays; another seed another one; its size is as asked."""
     plant, asked = Plant.of(rrr().arm), experiment(plain(), 400)
@@ -176,16 +168,6 @@ def test_noise_is_each_replicas_own() -> None:
     assert spread[1] / spread[0] == pytest.approx(2.0, rel=0.05)
 
 
-def test_the_noise_is_known_that_a_drive_gave() -> None:
-    """Pinocchio's arm, whose drives give their commands and this noise, moves as the one that was simulated with its seed."""
-    noise = np.array([torque[:, 0] for torque, _ in _draws(NOISE, (5,), SAMPLES)])
-    found = run(Plant.of(rrr().arm), experiment(plain(), SAMPLES), 8, NOISE, (5,))
-    q, _, tau = pinocchio_run(backward_pd(lambda k, command, _: command + noise[k]))
-    np.testing.assert_allclose(found.true_q[0], q, atol=1e-8)
-    np.testing.assert_allclose(found.tau[0] + noise, tau, atol=1e-4)
-    assert noise.std(axis=0) == pytest.approx(NOISE.torque, rel=0.1)
-
-
 def test_experiments_side_by_side_do_what_they_do_alone() -> None:
     """Three experiments of different length and reference, many replicas each, run at once: bit for bit the same."""
     plant = Plant.of(rrr().arm)
@@ -198,10 +180,3 @@ def test_experiments_side_by_side_do_what_they_do_alone() -> None:
                           strict=True):
         np.testing.assert_array_equal(one.q, alone.q)
         np.testing.assert_array_equal(one.tau, alone.tau)
-
-
-def test_an_excitation_that_ends_before_the_experiment_is_an_error() -> None:
-    """And no loop without an end."""
-    asked = experiment(plain(), 300, v=np.zeros((100, 3)))
-    with pytest.raises(ValueError, match="shape"):
-        run(Plant.of(rrr().arm), asked, 2)

@@ -12,9 +12,6 @@ from bench import experiments
 from bench.draw import draw_machine
 from bench.faults import make
 from bench.plant import record
-from pipelines.errors import InputRejected
-from pipelines.estimation.checks.gates import examined
-from pipelines.estimation.checks.plausibility import mismatches
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.quality.subject import Subject
 from pipelines.simulation.commanded import against_command, commanded
@@ -108,47 +105,6 @@ def test_a_recorder_that_smooths_is_a_cause_and_no_other_clock(time_constant: fl
     assert said(with_signal(log, tau=tau)) == []
 
 
-def test_a_measured_torque_may_be_what_the_drive_made_of_its_command() -> None:
-    """Seven tenths of it, or later: a cause; an eighth is a unit."""
-    for joint, change, late, codes in ((2, 0.7, 0, []), (2, 1.0, 20, []), (2, 0.125, 0, ["S15"])):
-        found = said(replace(with_torque(joint, change, late), torque="measured"))
-        assert [code for code, _ in found] == codes
-
-
-@pytest.mark.parametrize(("gain", "factor"), [("kp", 2.0), ("kd", 0.5)])
-def test_a_controller_that_is_described_wrong_says_nothing(gain: str, factor: float) -> None:
-    """Twice the stiffness and the same damping make another torque, not a multiple of it."""
-    log = recorded()
-    assert log.controller is not None
-    assert said(replace(log, controller=replace(log.controller, **{gain: factor * getattr(log.controller, gain)}))) == []
-
-
-def test_gains_of_the_other_sign_do_not_turn_a_torque_that_is_right() -> None:
-    """Motion says that inertia is positive: what is wrong is the description of the controller, which no fit takes."""
-    log = recorded()
-    assert log.controller is not None
-    signs = {gain: -getattr(log.controller, gain) for gain in ("kp", "kd")}
-    assert not [check for check in mismatches(Subject(replace(log, controller=replace(log.controller, **signs)))) if check.gate]
-
-
-@pytest.mark.filterwarnings("error")
-def test_an_observer_of_another_sample_time_that_runs_away_says_nothing() -> None:
-    log = recorded()
-    assert log.controller is not None
-    assert log.controller.observer_gain is not None
-    wild = replace(log, controller=replace(log.controller, observer_gain=20.0 * log.controller.observer_gain))
-    assert commanded(wild) is None
-    assert said(wild) == []
-
-
-@pytest.mark.filterwarnings("error")
-def test_a_torque_that_changes_at_the_start_alone_says_nothing() -> None:
-    log = recorded()
-    held = np.repeat(log.tau[:1], len(log.tau), axis=0)
-    held[:5] += 1.0
-    assert said(with_signal(log, tau=held)) == []
-
-
 @pytest.mark.parametrize("spoiled", ["nobody", "open-loop", "gap"])
 def test_without_a_controller_that_can_be_followed_nothing_is_said(spoiled: str) -> None:
     log = with_torque(2, 20.0)
@@ -161,11 +117,3 @@ def test_without_a_controller_that_can_be_followed_nothing_is_said(spoiled: str)
         log = replace(log, controller=None if spoiled == "nobody" else replace(log.controller, law="open-loop"))
     assert commanded(log) is None
     assert said(log) == []
-
-
-def test_a_diagnosis_is_refused_before_any_physics_is_blamed() -> None:
-    """By the exact factor, also where the torque is so large that its limits refuse it."""
-    for factor in (0.2, 30.0):
-        log = with_signal(recorded(), tau=factor * recorded().tau)
-        with pytest.raises(InputRejected, match=f"RRID-S10.*joint 1 is {factor:.3g} times what the controller"):
-            examined([log])

@@ -15,7 +15,7 @@ from pipelines.io.model_file import model_text
 from pipelines.io.robot import format_robot
 from pipelines.io.robot_files import load_robot
 from pipelines.simulation import Experiment
-from tests.simulation.arms import GAIN, KD, KP, TS, rrr, waving
+from tests.simulation.arms import KD, KP, TS, rrr, waving
 
 SAMPLES = 50
 PD = Controller("pd", KP, KD, velocity="backward-difference")
@@ -68,13 +68,6 @@ def test_it_starts_where_the_arm_is() -> None:
     assert (off.start_time, off.n_samples) == (3.0, SAMPLES)
 
 
-def test_a_plan_can_be_simulated() -> None:
-    """References and a controller are enough."""
-    plan = Experiment.of_log(log_of(without=("q", "tau"), origin="planned"))
-    np.testing.assert_array_equal(plan.q0, waving(SAMPLES)[0][0])
-    np.testing.assert_array_equal(plan.tau0, np.zeros(3))
-
-
 def test_speed_is_derived_where_only_positions_were_planned() -> None:
     """dq_ref from q_ref; ddq_ref only where a feed-forward asks for it."""
     found = Experiment.of_log(log_of(without=("dq_ref", "ddq_ref")))
@@ -83,36 +76,3 @@ def test_speed_is_derived_where_only_positions_were_planned() -> None:
     asked = replace(PD, law="pd+feedforward", feedforward=("gravity",), model=model)
     with pytest.raises(InputRejected, match="ddq_ref"):
         Experiment.of_log(log_of(asked, without=("ddq_ref",)))
-
-
-def test_the_controllers_own_model_is_read() -> None:
-    """Feed-forward runs on the model that the log carries, and on no other."""
-    arm = rrr().arm
-    text = model_text(arm.with_body(arm.body, 1.1 * arm.p).to_model())
-    found = Experiment.of_log(log_of(replace(PD, law="pd+feedforward", feedforward=("inertia",), model=text)))
-    assert found.feedforward_arm is not None
-    np.testing.assert_allclose(found.feedforward_arm.p, 1.1 * arm.p)
-
-
-def test_held_joints_stay_where_no_reference_is_logged() -> None:
-    """Open loop: the moving joint follows the logged torque, the others their first position."""
-    law = Controller("open-loop", KP, KD, velocity="observer", observer_gain=GAIN)
-    log = log_of(law, without=("q_ref", "dq_ref", "ddq_ref"), experiment="friction", joint=2)
-    found = Experiment.of_log(log)
-    assert found.driven is not None
-    np.testing.assert_array_equal(found.driven, [False, True, False])
-    np.testing.assert_array_equal(found.tau, log.tau)
-    np.testing.assert_array_equal(found.q_ref, np.tile(log.q[0], (SAMPLES, 1)))
-    whole = Experiment.of_log(log_of(Controller("open-loop"), without=("q_ref", "dq_ref", "ddq_ref")))
-    assert whole.driven is not None
-    assert whole.driven.all()
-
-
-def test_a_part_starts_on_the_reference() -> None:
-    """What the choice of the step tries."""
-    whole = Experiment.of_log(log_of())
-    part = whole.part(20, 10)
-    np.testing.assert_array_equal(part.q_ref, whole.q_ref[20:30])
-    np.testing.assert_array_equal([part.q0, part.dq0], [whole.q_ref[20], whole.dq_ref[20]])
-    assert part.start_time == pytest.approx(3.02)
-    np.testing.assert_array_equal(whole.part(0, 10).q0, whole.q0)

@@ -15,7 +15,7 @@ from pipelines.simulation.integrate import OneArm, RungeKutta
 from pipelines.simulation.plant import Plant
 from tests.dynamics.serial_arms import ARMS
 from tests.seeds import rarely
-from tests.simulation.arms import TS, Case, rrr, rrr_friction, serial
+from tests.simulation.arms import TS, Case, rrr, serial
 from tests.simulation.pinocchio_loop import Loop
 
 CHAINS = tuple(name for name in ARMS if name != "rrr")
@@ -63,20 +63,6 @@ def test_a_rotor_is_pinocchios_armature(name: str, shared: Path, tmp_path: Path)
     q, dq, torque = states(case, 20)
     judge = theirs(case, q, dq, torque)
     np.testing.assert_allclose(accelerations(Plant.of(arm), q, dq, torque), judge, atol=1e-10 * np.abs(judge).max())
-
-
-@pytest.mark.slow
-def test_one_second_open_loop_of_the_rrr_arm() -> None:
-    """Within 1e-9 rad of Pinocchio's RK4 after 1 s at 4 kHz, alone without arrays and among others."""
-    case, plant = rrr(), Plant.of(rrr().arm)
-    torque = 8.0 * np.sin(np.arange(1000)[:, None] * np.array([0.011, 0.017, 0.023])) * np.array([2.0, 1.0, 0.3])
-    start = np.array([0.1, -1.0, 0.4])
-    judge, _, _ = Loop(case.model, rrr_friction(), steps=4).run(start, np.zeros(3), lambda k, q: torque[k], 1000)
-    assert OneArm.fits(plant)
-    for integrator, replicas in ((OneArm(plant, TS, 4), 1), (RungeKutta(plant.prepared(3), TS, 4), 3)):
-        found = follow(integrator, start, torque, replicas)
-        assert np.abs(found - judge[:, None]).max() < 1e-9
-    assert np.ptp(judge, axis=0).min() > 0.5
 
 
 def test_one_second_open_loop_of_six_joints(shared: Path, tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -13,11 +13,8 @@ import pytest
 from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Motion
 from pipelines.effects.base import ArmModel, Effect, Hooks, Parameters, Values, Words
-from pipelines.effects.friction import QuadraticDrag
-from pipelines.errors import InputRejected
 from pipelines.io.log import Array, Controller
 from pipelines.simulation import Plant, run
-from tests.seeds import rarely
 from tests.simulation.arms import KD, KP, TS, Case, experiment, rrr, rrr_friction, waving
 from tests.simulation.pinocchio_loop import Loop
 
@@ -114,28 +111,6 @@ def test_the_last_effect_meets_the_command_first() -> None:
     assert np.abs(found - expected).max() < 1e-7
 
 
-@pytest.mark.parametrize("replicas", [1, *rarely(2)])
-def test_a_load_of_one_joint_counts_once_beside_a_drive_that_is_changed(replicas: int) -> None:
-    """Which effects take arrays is no matter: a drag that needs none stands below and above one that does."""
-    gain, drag = np.array([1.5, 1.5, 1.5]), 0.4
-    drives = Acting(Hooked(make=lambda arm: Hooks(actuator=lambda command, motion, _: gain * command)), ())
-    below, above = (Acting.of(QuadraticDrag(joint), {"coefficient": drag}) for joint in (2, 3))
-    controller = Controller("pd", KP, KD, velocity="backward-difference")
-    plant = Plant.of(rrr().arm.extended(below, drives, above))
-    found = run(plant, experiment(controller, SAMPLES), 8, seeds=range(replicas)).true_q[-1]
-    where = np.array([0.0, drag, drag])
-    expected = judge(drive=lambda tau: gain * tau, load=lambda t, q, dq: where * dq * np.abs(dq)).position()
-    assert np.abs(found - expected).max() < 1e-7
-    assert np.abs(found - judge(drive=lambda tau: gain * tau).position()).max() > 1e-5
-
-
-@pytest.mark.parametrize("replicas", [1, 2])
-def test_an_arm_whose_drives_turn_the_wrong_way_runs_away(replicas: int) -> None:
-    plant = Plant.of(rrr().arm.extended(Acting(Hooked(make=lambda arm: Hooks(actuator=lambda tau, motion, _: -3.0 * tau)), ())))
-    with pytest.raises(InputRejected, match="runs away"):
-        run(plant, experiment(Controller("pd", KP, KD, velocity="backward-difference"), 4 * SAMPLES), 8, seeds=range(replicas))
-
-
 def test_a_sensor_is_in_the_loop() -> None:
     """An encoder crosstalk."""
     mix = np.array([[1.0, 0.0, 0.0], [0.02, 1.0, 0.0], [0.0, 0.0, 1.0]])
@@ -172,18 +147,6 @@ def test_a_state_in_continuous_time() -> None:
     expected = _lagging(lag)
     assert np.abs(found - expected).max() < 1e-7
     assert differs(expected)
-
-
-def test_a_memory_of_the_drive_sees_what_reaches_it() -> None:
-    """A lag behind a clip: the lag's own rate is given the clipped torque, not the command."""
-    limit, lag = np.array([12.0, 8.0, 2.0]), 4e-3
-    inner = Acting(Hooked(make=lambda arm: Hooks(actuator=lambda command, motion, x: x, states=3,
-                                                 rate=lambda motion, command, x: (command - x) / lag)), ())
-    outer = Acting(Hooked(make=lambda arm: Hooks(actuator=lambda command, motion, _: np.clip(command, -limit, limit))), ())
-    controller = Controller("pd", KP, KD, velocity="backward-difference")
-    found = run(Plant.of(rrr().arm.extended(inner, outer)), experiment(controller, SAMPLES), 8).true_q[0]
-    assert np.abs(found - _lagging(lag, limit)).max() < 1e-7
-    assert np.abs(found - _lagging(lag)).max() > 1e-4
 
 
 def _lagging(lag: float, limit: Array | float = np.inf) -> Array:
@@ -230,45 +193,3 @@ def test_a_memory_from_sample_to_sample(where: str) -> None:
             return kept[-2]
 
         assert np.abs(found - judge(sense=sense).position()).max() < 1e-8
-
-
-def test_a_memory_starts_as_it_is_told() -> None:
-    """`start` gets the first motion, and the torque that it needs: a spring before the arm is then wound up from the beginning."""
-    seen: list[tuple[Array, Array]] = []
-
-    def start(motion: Motion, tau: Array) -> Array:
-        seen.append((motion.q.copy(), tau))
-        return tau
-
-    simulated(lambda arm: Hooks(load=lambda motion, x: 0 * x, states=3, start=start))
-    q, tau = seen[0]
-    case = rrr()
-    expected = pin.rnea(case.model, case.model.createData(), q[0], np.zeros(3), np.zeros(3))
-    np.testing.assert_allclose(tau[0], expected, atol=1e-12)
-    np.testing.assert_allclose(q[0], waving(1)[0][0], atol=0)
-
-
-def test_friction_that_is_no_curve_acts_all_the_same() -> None:
-    """A law without a speed curve is simulated as a load, and moves the arm as the same law with one does."""
-    curved = rrr().arm
-    laws = tuple(Acting(_Uncurved(law.effect.joint, inner=law.effect), law.parameters) for law in curved.friction)
-    controller = Controller("pd", KP, KD, velocity="backward-difference")
-    results = [run(Plant.of(arm), experiment(controller, 300), 4, seeds=(0, 1)).true_q[0]
-               for arm in (curved, replace(curved, friction=laws))]
-    np.testing.assert_allclose(*results, atol=1e-12)
-
-
-@dataclass(frozen=True)
-class _Uncurved(Effect):
-    name = "uncurved"
-    parameters: ClassVar[Parameters] = Parameters()
-    words = Words("For tests", *["none"] * 4)
-    inner: Effect | None = None
-
-    def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        assert self.inner is not None
-        return self.inner.columns(motion, arm)
-
-    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
-        assert self.inner is not None
-        return self.inner.simulate(arm, values)

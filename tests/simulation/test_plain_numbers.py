@@ -3,23 +3,15 @@ which take arrays."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Array
-from pipelines.dynamics.functions import ARRAYS, NUMBERS
-from pipelines.effects.angle import Cogging, Spring
-from pipelines.effects.bodies import GravityTilt
 from pipelines.effects.drives import LoadFriction, TorqueCrosstalk, TorqueGain, TorqueSaturation
-from pipelines.effects.friction import Stribeck
 from pipelines.effects.presliding import Presliding
-from pipelines.errors import InputRejected
 from pipelines.io.log import Controller
 from pipelines.simulation import Noise, Plant, run
-from pipelines.simulation.closed_loop import runs_alone
 from pipelines.simulation.integrate import OneArm, RungeKutta
 from tests.simulation.arms import KD, KP, TS, experiment, rrr
 
@@ -31,7 +23,6 @@ LAWS = {
     "Dahl's exponent": Presliding(joint=1, distance=0.01, elastic=-0.4, exponent=0.7),
     "breakaway": Presliding(joint=2, distance=0.005, breakaway=0.6, breakaway_speed=0.2, damping_time=0.001),
 }
-SLIPS = Presliding(joint=2, distance=0.01, elastic=0.2, exponent=0.8, inner_loops=1.0)
 
 
 def acting(law: Presliding, amplitude: float = 2.0) -> Acting:
@@ -66,17 +57,6 @@ def test_alone_and_among_many(name: str) -> None:
     assert np.abs(alone - by_itself(plant())).max() > 1e-4
 
 
-def test_several_memories_beside_a_load_without() -> None:
-    """Each at its own joint, two at one, in the order of their states."""
-    spring = Spring(joint=3)
-    values = {q.name: 3.0 if q.name == "stiffness" else 0.0 for q in spring.parameters if q.unsaid is None}
-    arm = plant(acting(LAWS["breakaway"]), Acting.of(spring, values), acting(LAWS["bends first"], 0.7), acting(LAWS["LuGre"], 1.1))
-    assert sum(hook.remembering is not None for hook in arm.hooks) == 3
-    assert OneArm.fits(arm)
-    alone, among = both(arm)
-    np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
-
-
 def test_the_integrator_moves_memories_as_runge_kutta_does() -> None:
     """One sample after the other, outside a loop: angles, speeds and memories."""
     arm = plant(acting(LAWS["LuGre"]), acting(LAWS["breakaway"]))
@@ -92,44 +72,6 @@ def test_the_integrator_moves_memories_as_runge_kutta_does() -> None:
     np.testing.assert_allclose(state[:, 0], other[:, 1], rtol=0.0, atol=1e-10)
     np.testing.assert_allclose(states[0], others[1], rtol=0.0, atol=1e-10)
     assert np.ptp(seen, axis=0).min() > 1.0  # they bent to one side, and to the other
-
-
-def leaning(*more: Acting) -> Plant:
-    """Its rigid body is in no closed form: it takes arrays, but for the loads of single joints."""
-    return plant(Acting.of(GravityTilt(), {"angle": 0.05, "direction": 0.7, "waist_sine": 0.0, "waist_cosine": 0.0}), *more)
-
-
-def waves(amplitude: float) -> Acting:
-    cogging = Cogging(joint=3, order=11.0)
-    return Acting.of(cogging, cogging.values([amplitude, 0.2 * amplitude, 0.0, 0.0, 0.0, 0.0]))
-
-
-def test_loads_of_single_joints_beside_a_body_that_takes_arrays() -> None:
-    """Two of them, at one joint, and a drive before them: alone as among many."""
-    values = {"amplitude": 0.4, "speed": 0.1, "sharpness": 60.0, "tail": 0.0, "exponent": 2.0}
-    arm = leaning(waves(0.3), Acting.of(Stribeck(joint=3, speed=0.1), values), Acting.of(TorqueGain(joint=2), {"gain_error": 0.1}))
-    assert not OneArm.fits(arm)
-    assert sum(hook.alone is not None for hook in arm.hooks) == 2
-    alone, among = both(arm)
-    np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
-    assert np.abs(alone - by_itself(leaning())).max() > 1e-5
-
-
-def test_an_arm_that_runs_away_says_so_whatever_its_loads_make_of_it() -> None:
-    """D17: there is no sine of an infinite angle."""
-    with pytest.raises(InputRejected) as raised:
-        run(leaning(waves(0.3)), experiment(Controller("pd", -300.0 * KP, -300.0 * KD, velocity="backward-difference"), SAMPLES), 1)
-    assert raised.value.code == "RRID-D17"
-
-
-def test_what_remembers_more_numbers_takes_arrays() -> None:
-    """Elements that slip one after the other are no single number; the arm moves all the same, and beside what is one."""
-    arm = plant(acting(SLIPS), acting(LAWS["Dahl"]))
-    assert sum(hook.remembering is not None for hook in arm.hooks) == 1
-    assert not OneArm.fits(arm)
-    assert not runs_alone(arm, ASKED)
-    alone, among = both(arm)
-    np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
 
 
 DRIVES = {
@@ -151,24 +93,3 @@ def test_a_command_on_its_way_to_the_joints(names: tuple[str, ...]) -> None:
     alone, among = both(arm)
     np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
     assert np.abs(alone - by_itself(plant(acting(LAWS["LuGre"])))).max() > 1e-5
-
-
-def test_the_order_of_drives_is_that_in_which_they_act() -> None:
-    """A limit before the gain is another than one behind it."""
-    gain, limit = Acting.of(TorqueGain(joint=2), {"gain_error": -0.6}), DRIVES["limit"]
-    arms = [Plant.of(replace(rrr().arm, effects=order)) for order in ((gain, limit), (limit, gain))]
-    (one, among), (other, _) = map(both, arms)
-    np.testing.assert_allclose(one, among, rtol=0.0, atol=1e-10)
-    assert np.abs(one - other).max() > 1e-4
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_the_rate_of_a_number_is_that_of_an_array(name: str) -> None:
-    """Also beyond where it slides, where a step went too far, and at rest."""
-    memory = LAWS[name].own_memory(LAWS[name].values([2.0]))
-    assert memory is not None
-    rng = np.random.default_rng(3)
-    v, u = (x.ravel() for x in np.meshgrid([0.0, 1e-3, -1e-3, *rng.uniform(-2.0, 2.0, 20)],
-                                           [0.0, 1.0, -1.0, 1.0 + 1e-9, -1.2, *rng.uniform(-1.1, 1.1, 10)]))
-    plain = [memory.rate(bent, speed, NUMBERS) for bent, speed in zip(u.tolist(), v.tolist(), strict=True)]
-    np.testing.assert_allclose(memory.rate(u, v, ARRAYS), plain, rtol=1e-12, atol=1e-15)

@@ -11,7 +11,7 @@ from pipelines.dynamics.arm import Acting, Arm
 from pipelines.effects.friction import Coulomb
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array, Controller
-from pipelines.simulation import Noise, Plant, choose_step, run, simulate
+from pipelines.simulation import Noise, Plant, choose_step, run
 from tests.seeds import rarely
 from tests.simulation.arms import KD, KP, TS, experiment, rrr, rrr_friction, waving
 from tests.simulation.pinocchio_loop import Friction, Loop
@@ -55,24 +55,6 @@ def test_the_chosen_step_costs_a_tenth_of_noise_at_most(sharpness: float | None)
     assert step.per_sample <= (4 if sharpness != 2000.0 else 16)
 
 
-def test_a_replica_that_runs_alone_does_the_same_among_others() -> None:
-    arm, asked = rrr().arm, experiment(PD, 300)
-    step = choose_step(Plant.of(arm), asked, NOISE)
-    together = simulate(arm, asked, NOISE, (5, 6, 7), step=step)
-    for k, seed in enumerate((5, 6, 7)):
-        np.testing.assert_array_equal(simulate(arm, asked, NOISE, (seed,), step=step).q[0], together.q[k])
-
-
-def test_the_step_is_not_wasted() -> None:
-    """A quarter of the steps that were chosen leave more than was allowed."""
-    arm, friction = dry(2000.0)
-    plant, asked = Plant.of(arm), experiment(PD, 600)
-    step = choose_step(plant, asked, NOISE)
-    assert step.per_sample >= 4
-    coarse = run(plant, asked, step.per_sample // 4).true_q[0]
-    assert (np.sqrt(np.mean((coarse - judged(friction, 600, 32)) ** 2, axis=0)) > step.allowed).any()
-
-
 def test_no_step_is_small_enough_for_a_jump() -> None:
     """Friction that turns over within a hundredth of a thousandth rad/s: refused, with the remedy."""
     arm, _ = dry(2000.0)
@@ -89,15 +71,3 @@ def test_a_loop_that_is_unstable_is_refused() -> None:
     with pytest.raises(InputRejected, match="joint [123]") as refused:
         run(Plant.of(rrr().arm), experiment(replace(PD, kp=-20 * KP, kd=-KD), 3000), 2)
     assert refused.value.code == "RRID-D17"
-
-
-def test_an_arm_that_cannot_exist_is_refused() -> None:
-    """Negative inertia about the last axis: D15 with the posture, before anything moves."""
-    arm = rrr().arm
-    p = arm.p.copy()
-    p[12] = -0.05
-    impossible, asked = Plant.of(arm.with_body(arm.body, p)), experiment(PD, 100)
-    for attempt in (lambda: run(impossible, asked, 2), lambda: choose_step(impossible, asked)):
-        with pytest.raises(InputRejected, match="positive definite") as refused:
-            attempt()
-        assert refused.value.code == "RRID-D15"

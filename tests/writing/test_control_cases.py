@@ -18,11 +18,8 @@ from pipelines.writing.control_cases import (
     CASES,
     case_of,
     measured_cases,
-    one_task,
-    possible,
     simulated_cases,
     tip_std,
-    why_not,
 )
 from pipelines.writing.validation import residual
 from tests.dynamics.serial_arms import ARMS
@@ -55,35 +52,6 @@ def test_the_error_of_the_tip_is_what_pinocchio_says(logs: list[ExperimentLog], 
     log = rows(logs[0], slice(None, None, 5))
     off = judge.tip(log.q) - judge.tip(log["q_ref"])
     np.testing.assert_allclose(tip_std(log, log.q), off.std(axis=0), rtol=1e-9)
-
-
-def test_only_one_task_is_compared(logs: list[ExperimentLog]) -> None:
-    """Another reference or other gains: not in the table."""
-    controller = logs[2].controller
-    assert controller is not None
-    assert controller.kp is not None
-    stiffer = replace(logs[2], controller=replace(controller, kp=1.1 * controller.kp))
-    moved = with_signal(logs[3], q_ref=logs[3]["q_ref"] + 1e-3)
-    assert [log.name for log in one_task([*logs[:2], stiffer, moved, logs[5]], logs[0])] == ["writing-1", "writing-2", "writing-6"]
-
-
-@pytest.mark.parametrize("part", [slice(0, -15), slice(4, None), slice(7, -30)])
-def test_a_recorder_started_by_hand_is_the_same_task(logs: list[ExperimentLog], part: slice) -> None:
-    """Some samples of rest more or less, before or after: one task; the other half of it is not, nor is another rate."""
-    other = rows(logs[5], part)
-    assert [log.name for log in one_task([logs[0], other], logs[0])] == ["writing-1", "writing-6"]
-    assert [log.name for log in one_task([other, logs[0]], other)] == ["writing-6", "writing-1"]
-    for apart in (rows(logs[5], slice(0, SAMPLES // 2)), replace(logs[5], sample_time=2e-3)):
-        assert [log.name for log in one_task([logs[0], apart], logs[0])] == ["writing-1"]
-
-
-def test_inertia_needs_the_acceleration_of_the_reference(logs: list[ExperimentLog]) -> None:
-    """Many a PD controller logs none: cases 3 and 6 then are not simulated, for their inertia would be nothing."""
-    bare = replace(logs[0], signals={name: signal for name, signal in logs[0].signals.items() if name != "ddq_ref"})
-    assert possible(logs[0], [2, 3, 6]) == ([2, 3, 6], "")
-    some, reason = possible(bare, [2, 3, 4, 5, 6])
-    assert some == [2, 4, 5]
-    assert "ddq_ref" in reason
 
 
 def test_several_logs_of_a_case_are_pooled(logs: list[ExperimentLog]) -> None:
@@ -125,12 +93,3 @@ def test_the_order_of_the_cases_is_that_of_the_bench(logs: list[ExperimentLog],
                 if measured[a][k] > 1.5 * measured[b][k]:
                     assert simulated[a][k] > simulated[b][k]
     assert min(simulated[6]) > 1e-5
-
-
-def test_a_controller_that_cannot_be_followed_says_why(logs: list[ExperimentLog]) -> None:
-    controller = logs[0].controller
-    assert controller is not None
-    assert why_not(logs[0]) == ""
-    assert "computed-torque" in why_not(replace(logs[0], controller=replace(controller, law="computed-torque")))
-    assert "does not say" in why_not(replace(logs[0], controller=None))
-    assert "kd" in why_not(replace(logs[0], controller=replace(controller, kd=None)))

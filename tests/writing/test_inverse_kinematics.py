@@ -10,12 +10,11 @@ import pytest
 from pipelines.dynamics.kinematics import serial_chain
 from pipelines.dynamics.rrr_kinematics import rrr_geometry
 from pipelines.errors import UsageError
-from pipelines.io.robot import RobotDescription
 from pipelines.writing.inverse_kinematics import ClosedForm, Numerical
 from pipelines.writing.path import Page
 from pipelines.writing.task import WritingTask, writing_task
 from pipelines.writing.timing import Pace
-from tests.dynamics.serial_arms import ARMS, PUMA, Arm, table
+from tests.dynamics.serial_arms import ARMS, Arm
 from tests.writing.judge import OFFSETS, WEIGHTS, TipJudge
 
 POSTURES = {"tx40": (0.2, 0.4, 0.4, 0.1, 0.5, 0.0), "seven-joints": (0.3, 0.6, 0.2, -1.2, 0.3, 0.8, 0.0),
@@ -88,23 +87,3 @@ def test_a_singular_posture_is_refused(shared: Path, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="singular or nearly so") as caught:
         writing_task(arm.robot, "I", Page(y=y, x=x, z=z, height=1e-5), posture=stretched).sampled(1e-2)
     assert "letter 1, 'I'" in caught.value.where
-
-
-def test_two_joints_cannot_write() -> None:
-    robot = table("two", "mdh", PUMA[:2])
-    with pytest.raises(UsageError, match="2 joints cannot write"):
-        writing_task(robot, "A")
-
-
-def test_a_posture_of_another_arm_is_refused(shared: Path, tmp_path: Path) -> None:
-    robot: RobotDescription = ARMS["tx40"](shared, tmp_path).robot
-    with pytest.raises(UsageError, match="a posture of 3 joints for an arm of 6"):
-        writing_task(robot, "A", posture=(0.0, 0.0, 0.0))
-
-
-def test_a_choice_that_the_arm_does_not_have_is_refused(shared: Path, tmp_path: Path) -> None:
-    """Neither an elbow of the TX40 nor a posture of the RRR arm is passed over in silence."""
-    with pytest.raises(UsageError, match="elbow up of an arm that is not the RRR arm"):
-        writing_task(ARMS["tx40"](shared, tmp_path).robot, "A", elbow="up")
-    with pytest.raises(UsageError, match="a posture for an arm that has a closed form"):
-        writing_task(ARMS["rrr"](shared, tmp_path).robot, "A", posture=(0.0, 0.0, 0.0))

@@ -7,8 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from pipelines.errors import UsageError
-from pipelines.writing.path import Arc, Page, TipPath, lay_out
+from pipelines.writing.path import Page, TipPath, lay_out
 from tests.writing.judge import OFFSETS, WEIGHTS
 
 PAGE = Page(y=-0.37, x=0.05, z=0.6, height=0.11)
@@ -49,14 +48,6 @@ def test_pieces_are_parametrised_by_arc_length(path: TipPath) -> None:
         assert np.abs(np.linalg.norm(curvature, axis=1) - 1.0 / piece.radius).max() <= 1e-12
 
 
-def test_a_circle_is_as_long_as_a_circle() -> None:
-    """The round of the 6 is 2 π r long, r a quarter of the height; its straight part is 3/4 of the height."""
-    line, circle = lay_out("6", PAGE).pieces
-    assert isinstance(circle, Arc)
-    assert circle.length == pytest.approx(2 * np.pi * PAGE.height / 4, rel=1e-14)
-    assert line.length == pytest.approx(0.75 * PAGE.height, rel=1e-14)
-
-
 def test_corners_and_bends_are_told_apart() -> None:
     """L has a corner, J passes into its arc; in an 8 the curvature alone changes."""
     assert lay_out("L", PAGE).joints == ("corner",)
@@ -74,9 +65,3 @@ def test_a_lifted_tip_leaves_the_plane_between_strokes_only() -> None:
     assert np.ptp(moves[:, 1]) == pytest.approx(0.02)
     flat = [piece.length for piece in lay_out("THE", Page()).pieces if piece.drawn]
     assert [piece.length for piece in pieces if piece.drawn] == flat
-
-
-@pytest.mark.parametrize("wrong", [{"height": 0.0}, {"height": -1.0}, {"x": float("nan")}, {"gap": -0.1}, {"y": float("inf")}])
-def test_impossible_pages_are_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(UsageError, match="page"):
-        Page(**wrong)

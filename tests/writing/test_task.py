@@ -9,17 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.dynamics.body import Array
 from pipelines.errors import UsageError
 from pipelines.io.robot import RobotDescription
 from pipelines.io.robot_files import load_robot
 from pipelines.writing.inverse_kinematics import Elbow
 from pipelines.writing.path import Page
 from pipelines.writing.task import WritingReference, WritingTask, demands, writing_task
-from pipelines.writing.timing import Pace
 from sample_logs.make_model import synthetic_arm
 from tests.dynamics.serial_arms import ARMS
-from tests.writing.judge import OFFSETS, WEIGHTS, TipJudge
+from tests.writing.judge import TipJudge
 
 TEXT = "RRRID 2004 SG"
 
@@ -44,13 +42,6 @@ def reference(task: WritingTask) -> WritingReference:
     return task.sampled(1e-3)
 
 
-def spread(task: WritingTask, samples: int) -> Array:
-    """Random times of the task, none within half a millisecond of a corner, a bend or the end of a phase."""
-    t = np.sort(np.random.default_rng(5).uniform(0.0, task.duration, samples))
-    jumps = np.concatenate([task.passings("corner"), task.passings("bend"), task.rest + task.law.start])
-    return t[np.abs(t[:, None] - jumps).min(axis=1) > 5e-4]
-
-
 @pytest.mark.parametrize("elbow", ["up", "down"])
 def test_an_iterative_solution_agrees(robot: RobotDescription, judge: TipJudge, elbow: Elbow) -> None:
     """Pinocchio and Newton's method, from sample to sample, find the same joints to 1e-10 rad. Section III.B."""
@@ -58,28 +49,6 @@ def test_an_iterative_solution_agrees(robot: RobotDescription, judge: TipJudge, 
     q = reference.motion.q
     assert np.abs(judge.inverse(reference.tip.position, q[0]) - q).max() <= 1e-10
     assert np.abs(judge.tip(q) - reference.tip.position).max() <= 1e-14
-
-
-def test_the_elbow_is_up_or_down(robot: RobotDescription) -> None:
-    """With the elbow up it stands above the line from the shoulder to the tip, with the elbow down below."""
-    for elbow, above in (("up", 1.0), ("down", -1.0)):
-        reference = writing_task(robot, "AB", elbow=elbow).sampled(0.01)  # type: ignore[arg-type]
-        q2, tip = reference.motion.q[:, 1], reference.tip.position
-        reach = np.sqrt(tip[:, 0]**2 + tip[:, 1]**2 - 0.259**2)
-        height = 0.2 * np.sin(q2) - (tip[:, 2] - 0.56) / reach * 0.2 * np.cos(q2)
-        assert (above * height > 0).all()
-
-
-@pytest.mark.parametrize("slow", [0.0, 0.05])
-def test_speeds_and_accelerations_are_derivatives(robot: RobotDescription, slow: float) -> None:
-    """dq and ddq against eighth-order differences of q and dq: 1e-6 relative to the largest, joint by joint."""
-    task, h = writing_task(robot, TEXT, Page(height=0.1), Pace(slow=slow)), 2e-5
-    t = spread(task, 4000)
-    motion = task.motion(t)
-    there = [task.motion(t + k * h) for k in OFFSETS]
-    for mine, theirs in ((motion.dq, [m.q for m in there]), (motion.ddq, [m.dq for m in there])):
-        differences = sum(w * x for w, x in zip(WEIGHTS, theirs, strict=True)) / h
-        assert (np.abs(differences - mine).max(axis=0) <= 1e-6 * np.abs(mine).max(axis=0)).all()
 
 
 def test_pinocchio_sees_the_tip_move_as_the_letters_ask(judge: TipJudge, reference: WritingReference) -> None:
@@ -100,27 +69,6 @@ def test_it_starts_and_ends_at_rest(task: WritingTask, reference: WritingReferen
     assert not reference.drawn[still].any()
     assert np.abs(task.motion(task.passings("corner")).dq).max() <= 1e-12
     assert reference.tip.speed.max() == pytest.approx(task.pace.fast, rel=1e-12)
-
-
-def test_what_jumps_where_the_tip_passes_a_bend(robot: RobotDescription, task: WritingTask) -> None:
-    """In corners nothing jumps; in bends the tip's acceleration by slow²/radius at most; with slow = 0 nothing does."""
-    def jump(task: WritingTask, t: Array) -> Array:
-        return np.linalg.norm(task.tip(t + 1e-9).acceleration - task.tip(t - 1e-9).acceleration, axis=1)
-
-    smallest = min(piece.radius for piece in task.path.pieces)
-    assert len(task.passings("bend")) > 10
-    assert jump(task, task.passings("corner")).max() <= 1e-6
-    assert 1e-3 < jump(task, task.passings("bend")).max() <= 2 * task.pace.slow**2 / smallest * (1 + 1e-6)
-    stopping = writing_task(robot, TEXT, Page(height=0.1), Pace(slow=0.0))
-    assert jump(stopping, stopping.passings("bend")).max() <= 1e-6
-
-
-def test_every_sample_knows_its_letter(reference: WritingReference) -> None:
-    """Letters come in the order of the text, the spaces are passed over, and each lies where it belongs."""
-    seen = [int(k) for k in reference.letter[np.flatnonzero(np.diff(reference.letter, prepend=-1))]]
-    assert "".join(TEXT[k] for k in seen) == TEXT.replace(" ", "")
-    left = [reference.tip.position[(reference.letter == k) & reference.drawn, 0].min() for k in seen]
-    assert (np.diff(left) > 0).all()
 
 
 def test_the_demand_is_within_the_limits_with_a_model(robot: RobotDescription) -> None:
@@ -163,19 +111,3 @@ def test_beyond_a_limit_is_refused(robot: RobotDescription, joint: int, limits: 
     assert "letter " in caught.value.where
     assert "tip at (" in caught.value.where
     assert all(word in caught.value.message for word in (f"joint {joint}, {robot.joints[joint - 1].name}", *words))
-
-
-@pytest.mark.parametrize(("joint", "limits"), [(2, {"velocity": 1.0}), (3, {"acceleration": 10.0})])
-def test_the_remedy_helps(robot: RobotDescription, joint: int, limits: dict[str, object]) -> None:
-    """Slowed down to the share that the message names (a per cent less, for its rounding), the task is accepted."""
-    slim = limited(robot, joint, **limits)
-    with pytest.raises(UsageError, match="Slow the task down") as caught:
-        writing_task(slim, "RRRID").sampled(1e-3)
-    share = float(caught.value.remedy.split(" %")[0].split()[-1]) / 100 - 0.01
-    writing_task(slim, "RRRID", pace=Pace().slowed(share)).sampled(1e-3)
-
-
-@pytest.mark.parametrize("wrong", [0.0, -1e-3, float("nan"), 1.0])
-def test_impossible_sample_times_are_refused(task: WritingTask, wrong: float) -> None:
-    with pytest.raises(UsageError, match="sample time"):
-        task.sampled(wrong)

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
-from pipelines.errors import UsageError
 from pipelines.writing.path import Page, TipPath, lay_out
 from pipelines.writing.timing import Pace, TimeLaw, time_law
 from tests.writing.judge import OFFSETS, WEIGHTS
@@ -75,28 +72,3 @@ def test_at_rest_in_corners_and_slow_in_bends(path: TipPath, pace: Pace) -> None
         assert law.after[last] == (0.0 if joint == "corner" else pytest.approx(law.before[last + 1]))
         assert law.after[last] <= pace.slow
     assert law.before[0] == law.after[-1] == 0.0
-
-
-def test_fast_phases_are_as_fast_as_the_pace(path: TipPath) -> None:
-    """On a piece long enough the tip reaches the full speed and keeps it; on a short one it brakes as soon as it must."""
-    pace = Pace(fast=0.1)
-    law = time_law(path, pace)
-    reached = np.array([law.after[law.piece == k].max() for k in range(len(path.pieces))])
-    distance = 2 * 0.5 * 0.1 * max(1.875 * 0.1 / pace.acceleration, math.sqrt(10 / math.sqrt(3) * 0.1 / pace.jerk))
-    long = np.array([piece.length >= distance for piece in path.pieces])
-    assert (reached[long] == 0.1).all()
-    assert (reached[~long] < 0.1).all()
-    assert long.any()
-
-
-def test_a_faster_pace_takes_less_time(path: TipPath) -> None:
-    assert time_law(path, Pace(fast=0.8)).duration < time_law(path, Pace(fast=0.3)).duration
-    assert time_law(path, Pace(acceleration=12.0)).duration < time_law(path, Pace()).duration
-    assert time_law(path, Pace(slow=0.0)).duration > time_law(path, Pace(slow=0.1)).duration
-
-
-@pytest.mark.parametrize("wrong", [{"fast": 0.0}, {"slow": 0.7}, {"slow": -0.1}, {"acceleration": float("inf")},
-                                   {"jerk": float("nan")}])
-def test_impossible_paces_are_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(UsageError, match="pace"):
-        Pace(**wrong)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -82,24 +80,3 @@ def test_what_is_missed_in_one_stretch_is_found_there(log: ExperimentLog, motion
     assert (found.split, worst.label) == (split, labels[stretch - 1]) == ("standstills", f"stretch {stretch}")
     assert abs(worst.t - middle) < 0.01
     assert worst.error == pytest.approx(0.8, rel=0.15)
-
-
-def test_without_a_reference_stretches_are_of_time(log: ExperimentLog, motion: Reconstructed, arm: Arm) -> None:
-    bare = replace(log, signals={name: signal for name, signal in log.signals.items() if "ref" not in name})
-    split, labels, _ = stretches_of(bare)
-    assert (split, len(labels)) == ("time", 10)
-    found = judged(bare, motion, arm)
-    assert found.stretches[-1].end == pytest.approx(log.t[-1] - log.t[0])
-
-
-def test_the_largest_miss_is_not_what_filters_make_of_an_end(log: ExperimentLog, motion: Reconstructed, arm: Arm) -> None:
-    """A jolt in the last ten milliseconds, beside a smaller one in the middle of the second letter: that one is named."""
-    tau = log.tau.copy()
-    tau[-10:] += 20.0
-    middle = log.n_samples // 2
-    tau[middle:middle + 100] += 2.0
-    found = judged(with_signal(log, tau=tau), motion, arm)
-    assert found.low_pass_hz is not None
-    for one in found.largest:
-        assert abs(one.t - (log.t[middle + 50] - log.t[0])) < 0.2
-        assert log.t[-1] - log.t[0] - one.t > 1.0 / found.low_pass_hz

@@ -14,7 +14,6 @@ from pipelines.io.robot_files import load_robot
 from pipelines.writing.task import demands
 from pipelines.writing.via_points import ViaPoints, via_points
 from sample_logs.make_model import synthetic_arm
-from tests.writing.judge import OFFSETS, WEIGHTS
 
 
 @pytest.fixture(scope="module")
@@ -40,30 +39,6 @@ def test_every_move_uses_the_full_authority(robot: RobotDescription, arm: Arm, p
         share = max(one.share for one in demands(robot, points.at(t), arm))
         assert 0.9 * (1 - 1e-3) <= share <= 0.9 * (1 + 2e-3)
         start += seconds + points.rest
-
-
-def test_the_drives_decide_where_there_is_a_model(robot: RobotDescription, arm: Arm, points: ViaPoints) -> None:
-    """Torque limits make moves slower than limits of speed and acceleration alone; the postures are the same."""
-    without = via_points(robot, np.random.default_rng(2), moves=8, authority=0.9)
-    assert (without.q == points.q).all()
-    assert (points.seconds >= without.seconds).all()
-    assert (points.seconds > without.seconds).any()
-    motion = without.at(np.linspace(0.0, without.duration, 20_001))
-    assert max(one.share for one in demands(robot, motion)) == pytest.approx(0.9, rel=1e-4)
-
-
-def test_speeds_and_accelerations_are_derivatives(points: ViaPoints) -> None:
-    """Eighth-order differences: exact for polynomials of the fifth order, rounding apart."""
-    h = 1e-4
-    starts = points.rest + np.concatenate([[0.0], np.cumsum(points.seconds + points.rest)])
-    edges = np.concatenate([starts, starts - points.rest])
-    t = np.random.default_rng(7).uniform(0.0, points.duration, 2000)
-    t = t[np.abs(t[:, None] - edges).min(axis=1) > 5 * h]
-    motion = points.at(t)
-    there = [points.at(t + k * h) for k in OFFSETS]
-    for mine, theirs in ((motion.dq, [m.q for m in there]), (motion.ddq, [m.dq for m in there])):
-        differences = sum(w * x for w, x in zip(WEIGHTS, theirs, strict=True)) / h
-        assert np.abs(differences - mine).max() <= 1e-9 * np.abs(mine).max()
 
 
 def test_it_rests_at_every_via_point(points: ViaPoints) -> None:
@@ -92,15 +67,3 @@ def test_drives_too_weak_for_the_arm_are_named(robot: RobotDescription, arm: Arm
     weak = replace(robot, joints=(*robot.joints[:1], replace(robot.joints[1], torque=2.0), robot.joints[2]))
     with pytest.raises(UsageError, match="cannot carry the arm's own weight"):
         via_points(weak, np.random.default_rng(1), arm=arm)
-
-
-def test_a_robot_without_limits_is_refused(robot: RobotDescription) -> None:
-    free = replace(robot, joints=tuple(replace(joint, velocity=np.inf, acceleration=np.inf) for joint in robot.joints))
-    with pytest.raises(UsageError, match="no joint has a limit of speed or acceleration"):
-        via_points(free, np.random.default_rng(1))
-
-
-@pytest.mark.parametrize("wrong", [{"moves": 0}, {"authority": 0.0}, {"authority": 1.1}, {"rest": -1.0}])
-def test_impossible_settings_are_refused(robot: RobotDescription, wrong: dict[str, float]) -> None:
-    with pytest.raises(UsageError, match="via points"):
-        via_points(robot, np.random.default_rng(1), **wrong)  # type: ignore[arg-type]
