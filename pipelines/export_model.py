@@ -278,7 +278,8 @@ def _checks(result: Card) -> tuple[Check, ...]:
         remedy = "give each a [joint.link] with mass, com and inertia, from CAD or weighed"
         found.append(Check.of("S18", "warn", words, result.robot, remedy))
     if result.target == "urdf" and (words := other_gravity(result.gravity)):
-        found.append(Check.of("S18", "warn", words, result.robot))
+        remedy = "set the gravity in the program that reads the URDF"
+        found.append(Check.of("S18", "warn", words, result.robot, remedy))
     if said.impossible:
         words = f"no body could have the described link of {', '.join(said.impossible)}"
         found.append(Check.of("S17", "warn", words, result.robot, "correct the description"))

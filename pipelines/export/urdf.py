@@ -60,8 +60,8 @@ def other_gravity(size: float) -> str:
     """Return words about a gravity [m/s^2] that readers of a URDF do not take; else ""."""
     if abs(size - EXPORT.standard_gravity) <= _LEVEL:
         return ""
-    words = f"gravity is {size:.6g} m/s^2: set it in the program that reads the URDF"
-    return f"{words}, which takes {EXPORT.standard_gravity:g}"
+    words = f"gravity is {size:.6g} m/s^2, which a URDF cannot hold"
+    return f"{words}: programs that read it take {EXPORT.standard_gravity:g}"
 
 
 def text_of(root: Element) -> str:
