@@ -58,14 +58,14 @@ def _estimated(paths: list[Path], settings: Settings | None, held_out: str) -> R
         one = open_log(path)
         role = "validate" if path.stem == held_out else "identify"
         opened.append(replace(one, log=replace(one.log, role=role)))
-    return compute(Inputs(tuple(opened), (), (), None), settings or Settings(compare=False))
+    return compute(Inputs(tuple(opened), (), (), None), settings or Settings())
 
 
 def main(real: Path) -> None:
     """Print a line for each set and setting."""
     for label, settings in (
-        ("defaults", Settings(compare=False)),
-        ("--cutoff-hz 10", Settings(compare=False, cutoff_hz=_CUTOFF_HZ)),
+        ("defaults", Settings()),
+        ("--cutoff-hz 10", Settings(cutoff_hz=_CUTOFF_HZ)),
     ):
         for name, results in (("panda", [panda(real, settings)]), ("kr300", kr300(real, settings))):
             own = [100 * one.relative_error["validate"] for one in results]

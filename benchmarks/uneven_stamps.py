@@ -141,7 +141,7 @@ def recorded(one: Drawn, case: str, seed: int) -> ExperimentLog:
 def estimated(one: Drawn, case: str, seed: int) -> Result:
     """Return the estimate from the log of a case."""
     opened = Opened(Path(case), "", recorded(one, case, seed), ())
-    return compute(Inputs((opened,)), Settings(compare=False))
+    return compute(Inputs((opened,)), Settings())
 
 
 def scores(one: Drawn, found: Result) -> tuple[Array, Array]:

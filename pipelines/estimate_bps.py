@@ -19,7 +19,6 @@ from pipelines.estimation.balance import power_balance
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
 from pipelines.estimation.checks.plausibility import mismatches
-from pipelines.estimation.comparison import averaged, compare, residuals
 from pipelines.estimation.consistency import consistency
 from pipelines.estimation.estimate import (
     Fitted,
@@ -33,11 +32,10 @@ from pipelines.estimation.estimate import (
 )
 from pipelines.estimation.identifiability import hard_to_see, not_separated
 from pipelines.estimation.judgements import REMEDY, negative_viscous
-from pipelines.estimation.mean_period import doubts
+from pipelines.estimation.mean_period import averaged, doubts, residuals
 from pipelines.estimation.motion import Motions, Reconstructed, for_equations, reconstruct
 from pipelines.estimation.nominal import columns_in_words, fitted_arm, nominal_columns
 from pipelines.estimation.observers import Reconstruction
-from pipelines.estimation.rests import without_stiction
 from pipelines.estimation.result import Result, course, parameters, validity
 from pipelines.estimation.result import torques as torque_parts
 from pipelines.io.files import write_log
@@ -79,14 +77,13 @@ class Settings(Reconstruction):
     offset: bool = True
     rotor_inertia: bool | None = None  # None: on geared arms
     blocks: int = option(10, "Blocks held out in turn where no log is validate.")
-    compare: bool = True  # the four ways to reconstruct, side by side
     model: str | None = option(None, "model.json whose friction is subtracted, not fitted.")
     allow_overlap: bool = option(False, "One recording may be fitted and judged by.")
     skip_sanity_checks: bool = option(False, "Fit torque that fails its checks.")
 
     @property
     def reconstruction(self) -> Reconstruction:
-        return Reconstruction(self.method, self.order, self.jerk_std, self.bandwidth, self.average)
+        return Reconstruction(self.method, self.order, self.jerk_std, self.bandwidth)
 
 
 def read(request: Request, settings: Settings) -> Inputs:
@@ -139,8 +136,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     judges, said_too = _examined(validate, judging, settings, said_of_torque)
     even = for_equations((*motions, *judges))
     recipe = with_cutoff(recipe, even[: len(motions)])
-    means, scatter = averaged(even, settings.reconstruction, recipe.cutoff_hz)
-    means = without_stiction(means, len(motions), columns, recipe, settings.weighted)
+    means, scatter = averaged(even, recipe.cutoff_hz)
     fitted = fit_logs(means[: len(motions)], columns, recipe, settings.weighted)
     judged = judge(fitted, means[len(motions) :], settings.blocks)
     arm = fitted_arm(
@@ -151,23 +147,15 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         check
         for own, log in zip(scatter, logs, strict=True)
         if own is not None
-        for check in doubts(own.floor, log.source or log.name, settings.average)
+        for check in doubts(own[0], log.source or log.name)
     ]
     said += negative_viscous(fitted.estimate, arm.name)
-    result = replace(
+    return replace(
         _result(fitted, judged, (*motions, *judges), arm, settings),
         boundary=boundary,
         data_quality=(*said_of_torque, *said, *said_too, *said_of_periods),
-        noise_floor=residuals(scatter, fitted, judged, logs, settings.average),
-    )
-    return (
-        result
-        if not settings.compare
-        else replace(
-            result,
-            comparison=compare(fitted, judged, settings.blocks, settings.weighted),
-            rigid_body_alone=_rigid_body_alone(fitted, means, settings),
-        )
+        noise_floor=residuals(scatter, fitted, judged, logs),
+        rigid_body_alone=_rigid_body_alone(fitted, means, settings),
     )
 
 
@@ -283,7 +271,6 @@ def _result(
         unresolved=found.unresolved.told(columns_in_words(names)),
         hard_to_see=hard_to_see(found.solution, names),
         not_separated=not_separated(found.solution, found.std, names),
-        comparison=(),
         convergence_samples=growth.samples,
         convergence=growth.beta,
         convergence_std=growth.std,

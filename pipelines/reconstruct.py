@@ -103,7 +103,7 @@ def _motion(
     derived = derive(log, "reconstruct", settings.as_settings(), found.signals())
     drawn = len(before) < REPORT.reconstructed
     result = assess(log, found, settings, (opened.path.name, file), derived, drawn)
-    checks += doubts(result.noise_floor, opened.path, settings.average)
+    checks += doubts(result.noise_floor, opened.path)
     return result, [*checks, *_warnings(result, settings, opened.path)]
 
 

@@ -202,8 +202,6 @@ def _read(name: str, given: Mapping[str, Any]) -> tuple[Any, Any, Any, Common]:
     sets = common.set
     if name == "convert" and given["common_format"]:
         sets = (f"convert.to={common.format}", *sets)
-    if name == "estimate-bps" and common.no_report:
-        own["compare"] = False  # what only the report shows
     settings = make_settings(name, common.config, sets, own)
     paths = [path for key in ("logs", "replay", "prior_logs") for path in inputs.get(key, ())]
     paths += [inputs[key] for key in ("a", "b") if key in inputs]

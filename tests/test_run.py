@@ -21,7 +21,7 @@ from tests.healthy import begun
 # What is dear and has tests of its own is left out: diagnosis, the choice of a law of friction, simulated writing.
 WITHOUT = run.Settings({"fit-friction": fit_friction.Settings(law="three_sigmoid"),
                         "validate-writing": validate_writing.Settings(simulate=False)}, ("diagnose", "extend"))
-ESTIMATE = run.Settings({"estimate-bps": estimate_bps.Settings(compare=False)},
+ESTIMATE = run.Settings({"estimate-bps": estimate_bps.Settings()},
                         ("fit-friction", "reconstruct", "validate-writing", "frf", *WITHOUT.skip))
 
 

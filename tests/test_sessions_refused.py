@@ -18,7 +18,7 @@ from tests.healthy import begun
 
 READING = ("run", "inspect", "convert", "reconstruct", "fit_friction", "estimate_bps", "validate_writing", "frf", "diagnose",
            "extend", "simulate", "design_excitation")
-QUICK = ("--no-report", "--set", "estimate-bps.compare=false")
+QUICK = ("--no-report",)
 
 
 def _put(folder: Path, prefix: str, kinds: tuple[str, ...], origin: Path, **about: Any) -> None:

@@ -43,18 +43,11 @@ class ClockConfig:
 
 @dataclass(frozen=True)
 class PeriodConfig:
-    """When periods are alike, and when the first has settled."""
+    """When periods are alike, and when the first begins unlike the others."""
 
     on_sample: float = 1e-3  # of a sample: nearer than this, a phase lies on a sample
     outlier: float = 3.0  # times the usual deviation of a period from the middle one
-    windows: int = 100  # of a period, in which its start is compared with the rest
-    shortest: int = 8  # samples of a window
-    lull: int = 3  # windows in a row like the rest: what swings passes zero within one of them
-    quiet: tuple[float, float] = (0.6, 0.9)  # of a period: like the later ones, if anything is
-    unsettled: float = 2.0  # times the largest of the rest, and of the other periods there
-    ended: float = 3.0  # times the power of the rest: less, and a start is over before that
-    near: int = 10  # windows to either side that show how large the noise is at a phase
-    falls: float = 6.0  # times less power at the end of a start: noise of one level does not
+    start: float = 4.0  # times the usual power of the deviation in the first tenth of a period
 
 
 @dataclass(frozen=True)
@@ -69,7 +62,6 @@ class MeanPeriodConfig:
     noise: float = 3.0  # times what sample-to-sample noise explains: less is no difference
     drift: float = 0.25  # of the scatter that goes one way from the first period to the last
     sure: float = 5.0  # standard deviations of that share
-    latest: float = 0.5  # of the first of two periods that it may take to settle
 
 
 @dataclass(frozen=True)
@@ -166,7 +158,7 @@ class RegressionConfig:
 
 @dataclass(frozen=True)
 class EstimateConfig:
-    """When logs hold enough for a fit, and when their motion repeats."""
+    """When logs hold enough for a fit."""
 
     fewest: int = 200  # equations of a fit: ten a parameter of the RRR arm with friction
     fewest_of_joint: int = 20  # equations
@@ -174,9 +166,6 @@ class EstimateConfig:
     mostly: float = 0.01  # of the samples saturated: that is why none is left
     parts: int = 40  # of the convergence series
     highest: float = RegressionConfig.highest  # of the rate, of a cut-off
-    phases: int = 40  # of a period: one band of the spectrum of their means
-    repeats: float = 0.1  # of what a joint moves: more within one phase is another motion
-    still: float = 1e-3  # [rad or m] that matters to no regressor
 
 
 @dataclass(frozen=True)
@@ -197,9 +186,7 @@ class RestConfig:
     """Limits of a rest, and of leaving it out."""
 
     still: float = 0.2  # hypot of speed and acceleration over their rms; .1 to .3 are alike
-    memory: float = 0.05  # [s] a rest lasts at least, where no low-pass has a longer period
     more: float = 2.0  # times the residual of the motion, that a rest held by friction leaves
-    least: int = 20  # equations of a joint that have to remain
 
 
 @dataclass(frozen=True)

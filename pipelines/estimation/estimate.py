@@ -5,9 +5,7 @@
     judged = judge(fitted, others, blocks)           held-out errors
 
 Kostić et al. 2004, eq. (12)-(15): the equations of all logs stacked, joints weighted by their own
-residual; every log is reconstructed and conditioned alike. Memory is constant in the samples, but
-for logs whose motion repeats: the covariance holds a period of equations of each, one log after the
-other, so it grows with the period.
+residual; every log is reconstructed and conditioned alike. Memory is constant in the samples.
 """
 
 from __future__ import annotations
@@ -22,7 +20,7 @@ import numpy as np
 from pipelines.dynamics.body import Motion
 from pipelines.errors import InputRejected, UsageError
 from pipelines.estimation.config import EstimateConfig
-from pipelines.estimation.covariance import Contrasted, Cycle, Robust, robust_covariance
+from pipelines.estimation.covariance import Robust, robust_covariance
 from pipelines.estimation.filters import KEEP
 from pipelines.estimation.held_out import Stretches, by_blocks, by_stretches
 from pipelines.estimation.identifiability import (
@@ -61,7 +59,6 @@ __all__ = ["Motions"]
 
 _CONFIG = EstimateConfig()
 _KEPT = 4 << 20  # numerics: [B] of conditioned equations; longer ones are made at every pass
-_WHOLE = 1e-6  # numerics: of an equation, beyond a whole number of them a period
 
 
 class Stacked:
@@ -69,26 +66,21 @@ class Stacked:
 
     def __init__(self, logs: Sequence[Iterable[Block]]) -> None:
         self.logs = logs
-        self._kept: list[tuple[int, Block]] | None = []
+        self._kept: list[Block] | None = []
 
     def __iter__(self) -> Iterator[Block]:
-        for _, block in self.numbered():
-            yield block
-
-    def numbered(self) -> Iterator[tuple[int, Block]]:
-        """Yield each block with the place of its log."""
         if self._kept:
             yield from self._kept
             return
         kept, size = [], 0
-        for place, log in enumerate(self.logs):
+        for log in self.logs:
             for block in log:
                 size += sum(v.nbytes for v in block.values)
                 if size <= _KEPT:
-                    kept.append((place, block))
+                    kept.append(block)
                 else:
                     kept.clear()
-                yield place, block
+                yield block
         self._kept = kept if size <= _KEPT else None
 
 
@@ -144,56 +136,13 @@ class Estimate:
 
 
 def estimate(logs: Sequence[Iterable[Block]], columns: Columns, weighted: bool = True) -> Estimate:
-    """Fit the equations of `logs`; without `weighted` every joint counts alike, as in eq. (15).
-
-    Where a motion repeats, the covariance is no smaller than that of its periods one after the
-    other. Turned by phases it knows what repeats, but takes a period for all that its noise
-    remembers; in the order of time it is the other way round. Each tells too little where the other
-    holds, and where both hold they agree.
-    """
+    """Fit the equations of `logs`; without `weighted` every joint counts alike, as in eq. (15)."""
     stacked = Stacked(logs)
     weights = None if weighted else np.ones(columns.body.robot.n_joints)
     fitted = fit(stacked, weights=weights, gram=gather(stacked))
-    solution, longest = fitted.solution, fitted.statistics.longest
-    robust = robust_covariance(stacked, solution, longest)
-    cycles = tuple(map(cycle_of, logs))
-    if any(cycles):
-        turned = Contrasted(stacked.numbered, cycles)
-        by_phases = robust_covariance(turned, solution, turned.longest(longest))
-        robust = by_phases.at_least(robust)
+    solution = fitted.solution
+    robust = robust_covariance(stacked, solution, fitted.statistics.longest)
     return Estimate(columns, solution, robust, fitted.statistics, stacked)
-
-
-def cycle_of(equations: Iterable[Block]) -> Cycle | None:
-    """Return the phase of every equation; None where no phase comes again, or none is known.
-
-    A period comes but once where none is given, or the log is their mean already. One of a few
-    phases makes no spectrum, and where the motion does not repeat after it, equations of one phase
-    have nothing in common: the attribute is wrong. A period need be no whole number of equations:
-    those of one phase then lie up to half a step from it, an eighth of the shortest period that the
-    low-pass lets through.
-    """
-    if not isinstance(equations, LogEquations) or equations.found.mean is not None:
-        return None
-    log, moments = equations.found.good.log, equations.moments()
-    t, q = equations.found.motion.t[moments], equations.found.motion.q[moments]
-    if log.period is None or len(t) == 0 or t[-1] - t[0] <= log.period:
-        return None
-    step = log.sample_time * equations.conditioning.decimation
-    count = int(np.ceil(log.period / step - _WHOLE))
-    if count < _CONFIG.phases:
-        return None
-    phase = np.rint((t - t[0]) / log.period * count).astype(np.intp) % count
-    # positions of one phase scatter by little of what they do in all; n of them with n - 1 degrees
-    # of freedom
-    seen = np.bincount(phase, minlength=count)
-    mean = np.zeros((count, q.shape[1]))
-    np.add.at(mean, phase, q)
-    mean /= np.maximum(seen, 1)[:, None]
-    free = max(len(q) - np.count_nonzero(seen), 1)
-    within = np.sqrt(np.square(q - mean[phase]).sum(axis=0) / free)
-    allowed = np.maximum(_CONFIG.repeats * q.std(axis=0), _CONFIG.still)
-    return Cycle(phase, count) if np.all(within <= allowed) else None
 
 
 @dataclass(frozen=True)

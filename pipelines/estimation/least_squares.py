@@ -17,7 +17,7 @@ factors, which lose half as many digits. Of all samples one small matrix for eac
                  2012, section 2.2): loses the condition number only
 
 Channels stay apart, so that their weights can change without reading a sample again; two of a kind
-add up to that of all samples. The covariance of a motion that repeats needs more: a period at once.
+add up to that of all samples.
 """
 
 from __future__ import annotations
@@ -52,7 +52,6 @@ class Block:
     y: tuple[Array, ...]  # of each channel, (samples,)
     # of each channel (samples,): equations left out are zero throughout; None: all count
     used: tuple[Flags, ...] | None = None
-    noise: int = 0  # blocks with the same number have noise of the same spectrum
 
     @property
     def channels(self) -> int:
@@ -89,7 +88,7 @@ class Block:
         values = tuple(v[:, rows] for v in self.values)
         used = self.used and tuple(used[rows] for used in self.used)
         y = tuple(y[rows] for y in self.y)
-        return Block(self.width, self.columns, values, y, used, self.noise)
+        return Block(self.width, self.columns, values, y, used)
 
     def residual(self, beta: Array) -> Array:
         """Return y - A β (channels, samples)."""

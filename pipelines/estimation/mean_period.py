@@ -1,49 +1,50 @@
 """Average a periodic log to its mean period; measure what differs from one period to the next.
 
     floor, mean = mean_period(log, found, cutoff_hz)     scatter; a log of one period and its motion
-    other = alike(mean, how)                             its motion by another method
+    means, scatter = averaged(motions, cutoff_hz)        mean periods instead of their logs
+    floors = residuals(scatter, fitted, judged, logs)    residual, noise floor and their ratio
 
 The motion is averaged, not the equations: the regressor is not linear in it, and noise in its
-columns biases the estimate (errors in variables). Torque is averaged alike, over the same samples.
-The smoother being linear, the mean of the motions is the motion of the mean positions. It is not
-tuned anew to their smaller noise, which would let more of it through (of five periods with 3e-5 rad
-of noise the residual would be 3 to 16 % larger) to save a bias that is next to none (`Observers`).
+columns biases the estimate (errors in variables). The smoother being linear, the mean of the
+motions is the motion of the mean positions. The mean period lies between copies of itself, so that
+no filter feels an end; only the samples between them make equations, and each of them counts for as
+many as were averaged. The noise of an encoder falls with the number of periods only as far as it
+differs between them: where an arm repeats its motion to less than a step, the steps repeat as well.
 
-An arm that starts from rest takes a while until its loop has settled and the motion is periodic:
-its first period is left out where two others remain; of two, what had not settled of the first is,
-so that the mean there is the second one alone.
-
-The mean period lies between copies of itself, so that no filter feels an end; only the samples
-between them make equations, and each of them counts for as many as were averaged. The noise of an
-encoder falls with the number of periods only as far as it differs between them: where an arm
-repeats its motion to less than a step, the steps repeat as well.
+Noise is what differs from one period to the next: no model explains it. An error of the model is
+the same in every period, noise falls with the root of their number.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipelines.dynamics.body import Motion
-from pipelines.errors import Check, InputRejected, Level
+from pipelines.errors import Check, InputRejected
 from pipelines.estimation.config import MeanPeriodConfig
+from pipelines.estimation.estimate import Fitted, Judged
 from pipelines.estimation.filters import passed_both_ways
 from pipelines.estimation.grids import Grid, grids, lay_on, measured
+from pipelines.estimation.least_squares import errors, gather
 from pipelines.estimation.motion import (
     Mean,
+    Motions,
     Reconstructed,
-    Reconstruction,
     encoder_resolution,
-    reconstruct,
+    noise_response,
 )
 from pipelines.estimation.periods import Periods, average_periods, mean_of_periods, passed_std
+from pipelines.estimation.regression import LogEquations, cutoff_at
 from pipelines.io.limits import shorter_than_period
 from pipelines.io.log import Array, ExperimentLog, Signal, recording
-from pipelines.quality.segments import Mask, Usable, quantum, usable
+from pipelines.quality.segments import Mask, quantum, usable
 
 _CONFIG = MeanPeriodConfig()
+_SEED = 20040509  # numerics
+_DRAWS = 3  # numerics: of the noise of positions: their mean power is known to a few per cent
 
 
 @dataclass(frozen=True)
@@ -57,8 +58,11 @@ class NoiseFloor:
     cutoff_hz: float | None  # of the low-pass of equations; None: none
     position_low_pass: Array  # [rad] what the low-pass leaves of it
     torque_low_pass: Array  # [N m]
-    unlike: str  # why the periods are not to be averaged, in words; empty where they may be
-    settling_time: float | None = None  # [s] left out at the start of the first; None: not known
+    unlike: str  # why the periods are not averaged, in words; empty where they are
+
+
+MeanLog = tuple[ExperimentLog, Reconstructed]
+Scatter = tuple[NoiseFloor, MeanLog | None]  # None: the periods are not alike
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,14 +74,11 @@ class _Folded:
     rows: Mask  # (kept samples,) that are averaged
     first: int  # place on the grid where the first period begins
     step: float  # [s] between samples of the mean
-    repeats: float  # periods of which a sample of the mean is made, on average
-    settling_time: float = 0.0  # [s] left out at the start
-    unsettled: str = ""  # why that start cannot be left out, in words
 
 
 def mean_period(
     log: ExperimentLog, found: Reconstructed, cutoff_hz: float | None
-) -> tuple[NoiseFloor | None, tuple[ExperimentLog, Reconstructed] | None]:
+) -> tuple[NoiseFloor | None, MeanLog | None]:
     """Return the scatter between the periods of `log`, and its mean period as a log with a motion.
 
     The first is None where it has no period, or fewer than two are whole; the second where its
@@ -86,18 +87,16 @@ def mean_period(
     Args:
         cutoff_hz: of the zero-phase low-pass over equations; None: none.
     """
-    stamps = found.good.log.t
+    stamps, joints = found.good.log.t, log.n_joints
     if log.period is None or shorter_than_period(stamps, log.sample_time, 2.0 * log.period):
         return None, None
-    folded, joints = _fold(log, found, cutoff_hz), log.n_joints
-    if isinstance(folded, str):
+    try:
+        folded = _fold(log, found, cutoff_hz)
+    except InputRejected as problem:
         none = np.full(joints, np.nan)
-        return NoiseFloor(0, (), none, none, cutoff_hz, none, none, folded, 0.0), None
+        return NoiseFloor(0, (), none, none, cutoff_hz, none, none, problem.message), None
     periods = folded.periods
     passed, centred = _passed(log, folded.step, cutoff_hz)
-    least = _least(found, periods.mean)
-    # where one period alone was left, it differs from nothing
-    compared = np.sqrt((periods.count - 1) / max(folded.repeats - 1.0, 1e-300))
     sample = np.sqrt(periods.noise_variance)
     floor = NoiseFloor(
         periods.count,
@@ -105,120 +104,56 @@ def mean_period(
         sample[:joints],
         sample[joints:],
         cutoff_hz,
-        compared * passed_std(periods.rest[..., :joints], passed),
-        compared * passed_std(periods.rest[..., joints:], centred),
-        folded.unsettled or _unlike(periods, passed, least, joints),
-        folded.settling_time,
+        passed_std(periods.rest[..., :joints], passed),
+        passed_std(periods.rest[..., joints:], centred),
+        _unlike(periods, passed, _least(found, periods.mean), joints),
     )
     return floor, None if floor.unlike else _between_copies(log, found, folded)
 
 
-def alike(mean: Reconstructed, how: Reconstruction) -> Reconstructed:
-    """Return the same mean of the same periods, their motion reconstructed in another way."""
-    if mean.mean is None:
-        raise ValueError("not the mean of periods")
-    whole = reconstruct(mean.mean.source, how, mean.mean.whole.good)
-    return _averaged(replace(mean.mean, whole=whole), mean.good, mean.motion.t)
-
-
-def doubts(floor: NoiseFloor | None, where: object, averaged: bool = True) -> list[Check]:
-    """T10: periods that are not averaged, and what is left out of the mean, or kept without one.
-
-    A start is motion like any other, and its equations hold: that it is left out of the mean is a
-    remark. Somebody's hand on the arm is in no model: a warning.
-    """
-    if floor is None:
-        return []
-    mean = averaged and not floor.unlike
-    found: list[tuple[Level, str, str]] = []
-    if averaged and floor.unlike:
-        remedy = "check the attribute period; look for a drift, a touch or a changed load; "
-        remedy += "or say --no-average"
-        found.append(("warn", f"its periods are not averaged: {floor.unlike}", remedy))
-    fate = "left out of their mean" if mean else "kept, for its periods are not averaged"
-    if floor.left_out:
+def doubts(floor: NoiseFloor | None, where: object) -> list[Check]:
+    """T10: periods that are not averaged, and what is left out of the mean."""
+    found = list[Check]()
+    if floor is not None and floor.unlike:
+        words = f"its periods are not averaged: {floor.unlike}"
+        remedy = "check the attribute period; look for a drift, a touch or a changed load"
+        found.append(Check.of("T10", "warn", words, where=where, remedy=remedy))
+    elif floor is not None and floor.left_out:
         odd = ", ".join(map(str, floor.left_out))
-        words = f"period {odd} differs from the {floor.periods} others and is {fate}"
+        words = f"period {odd} differs from the {floor.periods} others and is left out of their "
+        words += "mean"
         remedy = "the first one often starts from rest; or somebody touched the arm"
-        if not mean:
-            remedy = "a start from rest does no harm there; "
-            remedy += "if somebody touched the arm, cut that period out"
-        found.append(("ok" if mean and floor.left_out == (1,) else "warn", words, remedy))
-    if floor.settling_time:
-        words = f"the first {floor.settling_time:.2g} s of its periods, in which the motion "
-        words += f"settled, are {fate}"
-        remedy = "record a period more: the first then is left out"
-        if not mean:
-            remedy = "they do no harm to a fit of every sample"
-        found.append(("ok", words, remedy))
-    return [Check.of("T10", *one[:2], where=where, remedy=one[2]) for one in found]
+        level = "ok" if floor.left_out == (1,) else "warn"
+        found.append(Check.of("T10", level, words, where=where, remedy=remedy))
+    return found
 
 
-def _fold(log: ExperimentLog, found: Reconstructed, cutoff_hz: float | None) -> _Folded | str:
-    """Return the periods of `log`; in words why it cannot be folded."""
+def _fold(log: ExperimentLog, found: Reconstructed, cutoff_hz: float | None) -> _Folded:
+    """Return the periods of `log`.
+
+    Raises:
+        InputRejected: it cannot be folded.
+    """
     seen, good, period = measured(log, found.good), found.good, log.period or np.inf
     most = _CONFIG.sparse * len(good.log.t)
-    try:
-        grid, *more = grids(good.log.t, seen.step, longest=max(10, int(most)))
-    except InputRejected as problem:
-        return problem.message
-    if more or grid.size > most:
-        return "its clock steps back or stands still for too long"
-    if grid.wanders:
-        return "its clock wanders"
+    grid, *more = grids(good.log.t, seen.step, longest=max(10, int(most)))
+    if more or grid.size > most or grid.wanders:
+        words = "its clock wanders" if grid.wanders else "its clock steps back or stands still"
+        raise InputRejected("T05", words, remedy="record with an even clock")
     rows = np.zeros(len(seen.y), dtype=bool)
     for run in good.runs:
         rows[run] = True
     x = np.hstack([seen.y, np.where(good.torque_spikes, np.nan, good.log.tau)])
     rows &= np.isfinite(x).all(axis=1)
-    if not rows.any():
-        return "no sample has both position and torque"
     first = int(grid.place[np.argmax(rows)])
     rows &= ~found.vague[good.kept].any(axis=1)
     x[~rows] = np.nan
     passed, least = _passed(log, grid.step, cutoff_hz)[0], _least(found, x)
-
-    def average(begin: int, kept: Mask, without: tuple[int, ...] = ()) -> _Folded:
-        laid = lay_on(np.where(kept[:, None], x, np.nan), grid)[begin:]
-        periods = average_periods(laid, 1.0 / grid.step, period, passed, least, without)
-        return _Folded(periods, grid, kept, begin, period / len(periods.mean), periods.count)
-
-    try:
-        return _settled(average(first, rows), average, passed, least)
-    except InputRejected as problem:
-        return problem.message
-
-
-def _settled(
-    folded: _Folded, average: Callable[..., _Folded], passed: Array, least: Array
-) -> _Folded:
-    """Return `folded` without a start unlike the later periods: without the first period where two
-    others remain, else without that start alone.
-
-    Args:
-        average: from the place where the first period begins, of these samples, without those.
-    """
-    out: tuple[int, ...] = ()
-    late = folded.periods.settling(passed, least)
-    if late and folded.periods.count > 2 and folded.periods.used[0] == 0:
-        out = (0,)
-        # one that alone measured a part of the period is kept for it
-        folded = average(folded.first, folded.rows, out)
-        late = folded.periods.settling(passed, least)
-    if late == 0:
-        return folded
-    phases, grid, used = len(folded.periods.mean), folded.grid, folded.periods.used
-    size = phases * folded.step / grid.step
-    begin, places = folded.first + round(used[0] * size), int(np.ceil(late * size / phases))
-    if late > _CONFIG.latest * phases:
-        words = f"the first of its {folded.periods.count} periods has not settled by its middle"
-        return replace(folded, unsettled=words)
-    time = places * grid.step
-    if grid.size - begin - places >= (used[-1] - used[0] + 1) * size:  # a run-in came before them
-        return replace(average(begin + places, folded.rows), settling_time=time)
-    rest = folded.rows & ~((grid.place >= begin) & (grid.place < begin + places))
-    repeats = folded.periods.count - late / phases
-    return replace(average(folded.first, rest, out), settling_time=time, repeats=repeats)
+    laid, rate = lay_on(x, grid)[first:], 1.0 / grid.step
+    periods = average_periods(laid, rate, period, passed, least)
+    if periods.count > 2 and periods.begins_apart(passed, least):
+        periods = average_periods(laid, rate, period, passed, least, (0,))
+    return _Folded(periods, grid, rows, first, period / len(periods.mean))
 
 
 def _passed(log: ExperimentLog, step: float, cutoff_hz: float | None) -> tuple[Array, Array]:
@@ -241,6 +176,8 @@ def _least(found: Reconstructed, x: Array) -> Array:
 
 def _unlike(periods: Periods, passed: Array, least: Array, joints: int) -> str:
     """Return which joint's periods differ by more than noise, and how; empty where none do."""
+    if periods.begins_apart(passed, least):
+        return f"the first of its {periods.count} periods begins unlike the others, as from rest"
     alike = periods.repeats(passed)
     level = np.hypot(alike.signal, periods.mean.mean(axis=0))
     size = np.append(alike.signal[:joints], level[joints:])
@@ -258,11 +195,10 @@ def _unlike(periods: Periods, passed: Array, least: Array, joints: int) -> str:
     return f"{names[worst]} drifts over the periods" if beyond[worst] > 0.0 else ""
 
 
-def _between_copies(
-    log: ExperimentLog, found: Reconstructed, folded: _Folded
-) -> tuple[ExperimentLog, Reconstructed]:
+def _between_copies(log: ExperimentLog, found: Reconstructed, folded: _Folded) -> MeanLog:
     """Return the mean period with copies of itself before and behind, and its motion."""
-    phases, joints, period = len(folded.periods.mean), log.n_joints, log.period or np.inf
+    periods, joints, period = folded.periods, log.n_joints, log.period or np.inf
+    phases, kept = len(periods.mean), found.good.kept
     copies = max(1, int(np.ceil(_CONFIG.margin / period)))
     start = float(found.good.log.t[0]) + folded.first * folded.grid.step
     place = np.arange((2 * copies + 1) * phases)
@@ -270,39 +206,106 @@ def _between_copies(
 
     def fold(x: Array) -> Array:
         laid = lay_on(np.where(folded.rows[:, None], x, np.nan), folded.grid)[folded.first :]
-        mean = mean_of_periods(laid, 1.0 / folded.grid.step, period, folded.periods.used)
+        mean = mean_of_periods(laid, 1.0 / folded.grid.step, period, periods.used)
         return mean[place % phases]
 
-    average = folded.periods.mean[place % phases]
+    average = periods.mean[place % phases]
     values = {"t": t, "q": average[:, :joints], "tau": average[:, joints:]}
     signals = {
         name: Signal(values[name], log.signals[name].units, log.signals[name].long_name)
         for name in values
     }
     mean = replace(log, signals=signals, sample_time=folded.step, derived=None)
-    saturated = fold(found.good.saturated.astype(np.float64)) > 0.0
-    good = replace(usable(mean), saturated=saturated)
-    varies = folded.periods.noise_variance[:joints]
+    good = replace(usable(mean), saturated=fold(found.good.saturated.astype(np.float64)) > 0.0)
+    varies = periods.noise_variance[:joints]
     differing = varies / np.maximum(varies, encoder_resolution(found.good) ** 2 / 12.0)
-    how = Mean(
-        copies * phases,
-        (copies + 1) * phases,
-        folded.repeats,
-        np.asarray(differing),
-        recording(log),
-        found,
-        fold,
+    how = Mean(copies * phases, (copies + 1) * phases, periods.count, recording(log), found)
+    motion = Motion(
+        t, *(fold(x[kept]) for x in (found.motion.q, found.motion.dq, found.motion.ddq))
     )
-    return mean, _averaged(how, good, t)
+    if found.std is None:
+        return mean, Reconstructed(motion, None, None, good, False, how)
+    shrink = np.sqrt(1.0 - differing * (1.0 - 1.0 / periods.count))
+    q, dq, ddq = (np.median(std, axis=0) * shrink + np.zeros_like(motion.q) for std in found.std)
+    return mean, Reconstructed(motion, (q, dq, ddq), found.observers, good, False, how)
 
 
-def _averaged(how: Mean, good: Usable, t: Array) -> Reconstructed:
-    """Return the mean motion of the periods, and how well it is known."""
-    whole, kept = how.whole, how.whole.good.kept
-    parts = (whole.motion.q, whole.motion.dq, whole.motion.ddq)
-    motion = Motion(t, *(how.fold(x[kept]) for x in parts))
-    if whole.std is None:
-        return Reconstructed(motion, None, None, good, False, how)
-    shrink = np.sqrt(1.0 - how.differing * (1.0 - 1.0 / how.periods))
-    q, dq, ddq = (np.median(std, axis=0) * shrink + np.zeros_like(motion.q) for std in whole.std)
-    return Reconstructed(motion, (q, dq, ddq), whole.observers, good, False, how)
+def averaged(
+    motions: Motions, cutoff_hz: float | None
+) -> tuple[Motions, tuple[Scatter | None, ...]]:
+    """Return the logs and motions that equations come from, and the scatter of periodic logs."""
+    means, scatter = [], list[Scatter | None]()
+    for log, found in motions:
+        floor, mean = mean_period(log, found, cutoff_at(cutoff_hz, 1.0 / log.sample_time))
+        scatter.append(None if floor is None else (floor, mean))
+        means.append((log, found) if mean is None else mean)
+    return tuple(means), tuple(scatter)
+
+
+@dataclass(frozen=True)
+class PeriodicLog:
+    """One periodic log: its noise, and what the estimate leaves of its torque. Per joint."""
+
+    log: str
+    role: str
+    periods: int  # compared
+    averaged: bool
+    why_not: str  # the periods are not averaged, in words
+    left_out: tuple[int, ...]  # periods that differ from the others, counted from 1
+    position: Array  # [rad] standard deviation of one sample of one period
+    torque: Array  # [N m]
+    torque_low_pass: Array  # [N m] what the low-pass over equations leaves of it
+    motion: Array  # [N m] what the noise of positions does to the model's torque, in the mean
+    noise_floor: Array  # [N m] noise in the mean period: torque's over √ their number, and motion's
+    residual: Array  # [N m] rms that the estimate leaves in the mean period; else in every sample
+    ratio: Array  # residual over noise floor: 1 where the model explains all that repeats
+
+
+def residuals(
+    scatter: Sequence[Scatter | None], fitted: Fitted, judged: Judged, logs: Sequence[ExperimentLog]
+) -> tuple[PeriodicLog, ...]:
+    """Return every periodic log's noise with the residual of its mean.
+
+    Args:
+        scatter: of `logs`, those fitted before those that judge.
+    """
+    own = [one for one in fitted.estimate.equations.logs if isinstance(one, LogEquations)]
+    sources = [log for log, _ in (*fitted.motions, *judged.motions)]
+    found = []
+    for both, one, log, source in zip(
+        scatter, (*own, *judged.equations), logs, sources, strict=True
+    ):
+        if both is None:
+            continue
+        noise, root = both[0], np.sqrt(one.repeats)
+        residual = errors(gather(one), fitted.estimate.beta).rms / root
+        motion = _of_motion(one, noise, source, fitted)
+        floor = np.hypot(noise.torque_low_pass / root, motion)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = residual / floor
+        names = (log.name, log.role, noise.periods, both[1] is not None, noise.unlike)
+        deviations = (noise.position, noise.torque, noise.torque_low_pass)
+        found.append(
+            PeriodicLog(*names, noise.left_out, *deviations, motion, floor, residual, ratio)
+        )
+    return tuple(found)
+
+
+def _of_motion(one: LogEquations, noise: NoiseFloor, log: ExperimentLog, fitted: Fitted) -> Array:
+    """Return the rms [N m] (joints,) by which equations change with new noise of the positions.
+
+    Of a mean over M periods, what differs between them is left to 1/M; of what counting in steps
+    leaves, the rest repeats.
+    """
+    found, mean, rng = one.found, one.found.mean, np.random.default_rng(_SEED)
+    source, whole = (log, found) if mean is None else (mean.source, mean.whole)
+    power, beta, own = np.zeros(log.n_joints), fitted.estimate.beta, found.motion
+    for _ in range(_DRAWS):
+        response, variance = noise_response(source, whole, fitted.recipe.how, len(own.t), rng)
+        differs = np.minimum(noise.position**2, variance) / variance
+        q, dq, ddq = response * np.sqrt(1.0 - differs * (1.0 - 1.0 / one.repeats))
+        motion = replace(own, q=own.q + q, dq=own.dq + dq, ddq=own.ddq + ddq)
+        shaken = replace(one, found=replace(found, motion=motion), chosen=one.rows)
+        for block, moved in zip(one, shaken, strict=True):
+            power += np.sum((moved.residual(beta) - block.residual(beta)) ** 2, axis=1)
+    return np.asarray(np.sqrt(power / np.maximum(_DRAWS * one.repeats * one.counts, 1)))

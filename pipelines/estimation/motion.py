@@ -58,7 +58,6 @@ class Reconstructed:
     good: Usable  # which samples, stretches and masks
     derived: bool  # taken from the log instead of computed
     mean: Mean | None = None  # where the log is the mean period of another
-    stuck: Mask | None = None  # (kept samples, joints) held by dry friction: no equations of it
     even: tuple[ExperimentLog, Reconstructed] | None = None  # of an uneven clock: on an even grid
 
     @property
@@ -83,11 +82,8 @@ class Mean:
     first: int  # samples from here on are the mean; those before are copies of it
     last: int  # and those from here on
     periods: float  # in the mean: of each of its samples, on average
-    differing: Array  # (joints,) share of the positions' noise variance that differs each period
     source: ExperimentLog
     whole: Reconstructed  # the motion of the source
-    # from any signal of the source, (kept samples, channels), to its mean and the copies
-    fold: Callable[[Array], Array]
 
 
 def known_median(x: Array) -> Array:

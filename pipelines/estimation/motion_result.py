@@ -145,7 +145,7 @@ def assess(
     if "q_ref" in found.good.log and np.isfinite(found.good.log["q_ref"][longest]).all():
         reference = found.good.log["q_ref"]
     smoothing = tuned.smoothing
-    floor, mean = _periods(log, seen, found, how)
+    floor, mean = _periods(log, seen, found)
     return LogResult(
         log.name,
         names[0],
@@ -198,12 +198,12 @@ def _typical_std(found: Reconstructed) -> tuple[Array, Array, Array]:
 
 
 def _periods(
-    log: ExperimentLog, seen: Measured, found: Reconstructed, how: Reconstruction
+    log: ExperimentLog, seen: Measured, found: Reconstructed
 ) -> tuple[NoiseFloor | None, MeanResult | None]:
     """Return what differs between periods, with the low-pass of an estimate, and their mean."""
     rate = 1.0 / seen.step
     floor, mean = mean_period(log, found, cutoff_at(wanted_cutoff(found.motion, rate), rate))
-    if floor is None or mean is None or not how.average:
+    if floor is None or mean is None:
         return floor, None
     return floor, MeanResult(floor.periods, *_typical_std(mean[1]))
 

@@ -42,15 +42,10 @@ class Reconstruction:
     bandwidth: tuple[float, ...] | None = option(
         None, "Bandwidth [Hz], instead of jerk: one, or one a joint."
     )
-    average: bool = option(
-        True,
-        "Of a periodic log, take the mean of periods that differ by noise alone. [average]",
-        "--average/--no-average",
-    )
 
     def as_settings(self) -> dict[str, object]:
-        """Return what a derived log must have been made with to be used; averaged or not."""
-        return {name: value for name, value in asdict(self).items() if name != "average"}
+        """Return what a derived log must have been made with to be used."""
+        return asdict(self)
 
     def check(self, joints: int) -> None:
         """C02: a method, an order, or numbers that no log of so many joints can be done with."""

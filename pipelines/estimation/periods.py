@@ -4,7 +4,7 @@ found = average_periods(x, rate, period)
 found.mean, found.noise_variance          one period, and the noise of one sample of one period
 passed_std(found.rest, amplitude)         the same noise after a filter
 found.repeats(amplitude)                  whether the periods differ by noise alone
-found.settling(amplitude, least)          how long the first takes to become like the others
+found.begins_apart(amplitude, least)      whether the first one starts unlike the others
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.estimation.config import PeriodConfig
@@ -20,7 +19,6 @@ from pipelines.io.log import Array
 
 _CONFIG = PeriodConfig()
 _POINTS = 6  # numerics: samples that interpolate one between them
-_LEAST = 1e-200  # numerics: of a power, where nothing differs
 
 
 @dataclass(frozen=True)
@@ -70,25 +68,28 @@ class Periods:
         rms = np.sqrt((signal**2).mean(axis=0))
         return Repeats(passed_std(self.rest, amplitude), rms, white, order, spread)
 
-    def settling(self, amplitude: Array, least: Array) -> int:
-        """Return the samples at the start of the first period that differ more than its rest does.
+    def begins_apart(self, amplitude: Array, least: Array) -> bool:
+        """Return whether the first period starts unlike the others, as an arm from rest does.
 
-        0: none; all of them: it goes on dying away to the end. A mean over the whole period hides a
-        start of a fiftieth of it. What noise allows is therefore read window by window: from the
-        same period later on, in proportion to how rough the noise is at each phase, for it need not
-        be the same all along a period, and from what the other periods scatter there, where there
-        are two or more. And a start dies away.
+        Its first tenth is held against that of the others, or of two periods against its own rest.
 
         Args:
             amplitude: of a filter, as in `passed_std`: a start may show in what it passes alone.
             least: (channels) as in `average_periods`.
         """
-        if self.count < 2:
-            return 0
+        if self.count < 2 or self.used[0] != 0:
+            return False
+        begin = max(1, self.rest.shape[1] // 10)
         gain = _white_gain(amplitude, self.rest.shape[1])
-        passed = _filtered(self.rest, amplitude)
-        plain = _settling(self.rest, self.rest, 1.0, least)
-        return max(plain, _settling(passed, self.rest, gain, least))
+        for rest, floor in ((self.rest, least), (_filtered(self.rest, amplitude), gain * least)):
+            first = (rest[0, :begin] ** 2).mean(axis=0)
+            usual = (rest[0, begin:] ** 2).mean(axis=0)
+            if self.count > 2:
+                others = rest[1:, :begin] + rest[0, :begin] / (self.count - 1)
+                usual = (others**2).mean(axis=(0, 1))
+            if (first > _CONFIG.start * np.maximum(usual, np.maximum(floor**2, 1e-200))).any():
+                return True
+        return False
 
 
 def average_periods(
@@ -102,16 +103,13 @@ def average_periods(
     """Fold `x` (samples, channels...), NaN where missing, at `period` [s].
 
     A period that is no whole number of samples is interpolated by polynomials through six samples,
-    good to 1e-6 of what moves slower than a tenth of the rate; what that takes off white noise is
-    allowed for. A period that deviates three times as much as the others do is left out (three
-    periods or more needed): the first, where the motion starts from rest, or one in which somebody
-    touched the arm.
+    good to 1e-6 of what moves slower than a tenth of the rate. A period that deviates three times
+    as much as the others do is left out (three periods or more needed).
 
     Args:
         amplitude: of a filter, as in `passed_std`; a period may then be odd in what it passes
             alone, where the noise does not hide it.
-        least: (channels) deviation of a sample that is never odd: what counting leaves. Periods
-            that are equal but for one step of an encoder have no odd one among them.
+        least: (channels) deviation of a sample that is never odd: what counting leaves.
         without: periods, counted from 0, to leave out.
 
     Raises:
@@ -184,14 +182,12 @@ def _fold(flat: Array, size: float, count: int) -> tuple[Array, float]:
     if len(flat) < _POINTS:
         words = f"{len(flat)} samples are too few to fold"
         raise InputRejected("T08", words, remedy="record more")
-    base = np.floor(at).astype(np.intp) - (_POINTS // 2 - 1)
-    base = np.clip(base, 0, len(flat) - _POINTS)
-    offset = at - base
-    weight = np.ones((_POINTS, count, phases))
+    base = np.clip(np.floor(at).astype(np.intp) - (_POINTS // 2 - 1), 0, len(flat) - _POINTS)
+    weight = np.ones((_POINTS, count, phases))  # Lagrange
     for i in range(_POINTS):
         for j in range(_POINTS):
             if i != j:
-                weight[i] *= (offset - j) / (i - j)  # Lagrange
+                weight[i] *= (at - base - j) / (i - j)
     folded = sum(weight[i][..., None] * flat[base + i] for i in range(_POINTS))
     return np.asarray(folded), float((weight**2).sum(axis=0).mean())
 
@@ -219,76 +215,6 @@ def _outliers(folded: Array, amplitude: Array | None, least: Array) -> tuple[int
         usual = np.maximum(np.median(spread, axis=0), floor)
         odd |= (spread > _CONFIG.outlier * usual + 1e-300).any(axis=1)
     return tuple(np.flatnonzero(odd).tolist())
-
-
-def _settling(rest: Array, raw: Array, gain: float, least: Array) -> int:
-    """Return the samples at the start of the first of `rest` (periods, samples, channels) that
-    differ in any channel.
-
-    Args:
-        raw: the same, unfiltered.
-        gain: of the filter, for white noise.
-    """
-    periods, samples = rest.shape[:2]
-    window, lull = max(_CONFIG.shortest, samples // _CONFIG.windows), _CONFIG.lull
-    count = samples // window
-    low, high = (int(share * count) for share in _CONFIG.quiet)
-    if high - low < lull:
-        return 0
-
-    def powers(x: Array) -> Array:
-        cut = x[:, : count * window].reshape(len(x), count, window, -1)
-        return np.asarray((cut**2).mean(axis=2))
-
-    # less the mean of the others, the first has M / (M-1) of the variance of a sample; they about
-    # that mean (M-2) / (M-1)
-    power = powers(rest[:1])[0] * (periods / (periods - 1))
-    near = np.arange(count)[:, None]
-    # noise that is larger at a phase is rougher there, and what dies away is smooth
-    bends = np.pad(np.diff(raw, 2, axis=1), ((0, 0), (0, 2), (0, 0)))
-    missing = raw == 0.0
-    bends[:, :-2][missing[:, :-2] | missing[:, 1:-1] | missing[:, 2:]] = 0.0
-    rough = powers(bends).sum(axis=0) * gain**2 / (6.0 * (periods - 1))
-    usual = rough[(near + np.arange(-lull + 1, lull)) % count].mean(axis=1)
-    if periods > 2:
-        others = powers(rest[1:] + rest[0] / (periods - 1)).sum(axis=0) / (periods - 2)
-        around = np.arange(-_CONFIG.near, _CONFIG.near + 1)
-        usual = np.maximum(usual, others[(near + around) % count].max(axis=1))
-    times = power / np.maximum(usual, np.maximum((gain * least) ** 2, _LEAST))
-    odd = times > _CONFIG.unsettled**2 * np.maximum(times[low:high].max(axis=0), 1.0)
-    channels = range(odd.shape[1])
-    longest = max(_start(odd[:, c], times[:, c], (low, high), power[:, c]) for c in channels)
-    return int(samples if longest == count else longest * window)
-
-
-def _start(odd: npt.NDArray[np.bool_], times: Array, quiet: tuple[int, int], power: Array) -> int:
-    """Return the windows until one channel has settled; all of them where it never does, none where
-    it should fall and does not.
-    """
-    (low, high), last = quiet, -1  # window of those that differ from the start on
-    for k in np.flatnonzero(odd).tolist():
-        if k - last > _CONFIG.lull:
-            break
-        last = k
-    if last < 0:
-        return 0
-    # what is slow has not died away in the rest, and makes that look worse than noise is
-    between = times[last + 1 : low].mean() if last + 1 < low else np.inf
-    ended = between <= _CONFIG.ended * max(float(times[low:high].mean()), 1.0)
-    start, before = power[: last + 2 if ended else low], power[high : -_CONFIG.lull]
-    # largest where it begins, above the end of the period, and falling: noise that follows the
-    # motion is as large at the end of one period as at the beginning of the next
-    peak = int(start.argmax())  # what precedes it may not have been measured
-    falling = start[peak:]
-    third = max(1, len(falling) // 3)
-    dies_away = (
-        peak < _CONFIG.lull
-        and start[peak] > _CONFIG.falls * before.max(initial=0.0)
-        and falling[:third].mean() > _CONFIG.falls * falling[-third:].mean()
-    )
-    if not dies_away:
-        return 0
-    return last + 1 if ended else len(times)
 
 
 def _white_gain(amplitude: Array, samples: int) -> float:

@@ -27,7 +27,6 @@ from pipelines.dynamics.body import Array, Motion, RigidBody
 from pipelines.dynamics.rrr import ACTING, RRR
 from pipelines.effects.base import ArmModel, Effect
 from pipelines.estimation.config import RegressionConfig
-from pipelines.estimation.covariance import of_mean
 from pipelines.estimation.filters import (
     KEEP,
     LowPass,
@@ -235,11 +234,10 @@ class LogEquations:
     chosen: Rows | None = None  # instead of the log's own choice: the same for several motions
 
     def __iter__(self) -> Iterator[Block]:
-        noise = 0 if self.found.mean is None else of_mean(self.repeats)
         for run in self.runs:
             for values, y, used in self._pieces(run):
                 if len(y[0]):
-                    yield Block(len(self.columns.names), self._places, values, y, used, noise)
+                    yield Block(len(self.columns.names), self._places, values, y, used)
 
     @cached_property
     def runs(self) -> tuple[slice, ...]:
@@ -265,7 +263,6 @@ class LogEquations:
         if (mean := self.found.mean) is not None:  # the rest are copies
             out[: mean.first] = out[mean.last :] = True
         slow = np.abs(self.found.motion.dq[good.kept]) < np.array(how.min_speed)
-        slow = slow if self.found.stuck is None else slow | self.found.stuck
         return Rows(out, slow | self._near_peaks(~(out[:, None] | slow)))
 
     def _near_peaks(self, rows: Flags) -> Flags:
@@ -319,11 +316,6 @@ class LogEquations:
         how, step = self.conditioning, self.found.good.log.sample_time
         reach = 2.0 * _CONFIG.touched / how.cutoff_hz if how.cutoff_hz else _CONFIG.memory
         return int(np.ceil(reach / (step * how.decimation)))
-
-    def moments(self) -> Indices:
-        """Return the sample of the recording of every equation."""
-        every = np.concatenate([self._moments(run) for run in self.runs])
-        return np.asarray(self.found.good.kept[every])
 
     def _moments(self, run: slice) -> Indices:
         """Return the samples of the mended log that make equations of any joint."""

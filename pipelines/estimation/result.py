@@ -10,11 +10,11 @@ from pipelines.dynamics.arm import Arm, ArmTorque
 from pipelines.errors import Check
 from pipelines.estimation.balance import Balance
 from pipelines.estimation.checks.boundary import Boundary
-from pipelines.estimation.comparison import Beside, Compared
 from pipelines.estimation.consistency import Consistent
 from pipelines.estimation.estimate import Fitted
 from pipelines.estimation.filters import choose_decimation, design_low_pass, zero_phase
 from pipelines.estimation.identifiability import Direction
+from pipelines.estimation.mean_period import PeriodicLog
 from pipelines.estimation.motion import Motions, Reconstructed
 from pipelines.estimation.regression import bridged, cutoff_at
 from pipelines.io.log import Array, ExperimentLog
@@ -79,7 +79,6 @@ class Result:
     hard_to_see: tuple[Direction, ...]
     # parameters determined only together
     not_separated: tuple[tuple[str, ...], ...] = field(default=(), kw_only=True)
-    comparison: tuple[Compared, ...]
     # [torque_units] held-out rms, no friction
     rigid_body_alone: tuple[float, ...] | None = field(default=None, kw_only=True)
     # what the logged torque is; null: no log tells
@@ -87,7 +86,7 @@ class Result:
     # given: the model file, or "fit-friction" of the same run
     friction_of: str = field(default="", kw_only=True)
     # of logs that hold two periods or more
-    noise_floor: tuple[Beside, ...] = field(default=(), kw_only=True)
+    noise_floor: tuple[PeriodicLog, ...] = field(default=(), kw_only=True)
     convergence_samples: tuple[int, ...]
     convergence: Array  # (counts, parameters)
     convergence_std: Array

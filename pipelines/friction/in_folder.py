@@ -14,8 +14,8 @@ from collections.abc import Iterable, Sequence
 
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.parameter import Parameter
-from pipelines.estimation.comparison import averaged
 from pipelines.estimation.estimate import Fitted, Recipe, fit_logs, motions_of, with_cutoff
+from pipelines.estimation.mean_period import averaged
 from pipelines.estimation.motion import Motions, Reconstruction, reconstruct
 from pipelines.estimation.nominal import fitted_arm, nominal_columns
 from pipelines.friction.config import FolderConfig
@@ -58,7 +58,7 @@ def _fit(motions: Motions, how: Reconstruction, friction: tuple[Acting, ...]) ->
                         for p in columns.body.parameters)
         recipe = Recipe(how, known=Arm(robot.name, columns.body, unknown, friction).friction_torque)
     recipe = with_cutoff(recipe, motions)
-    means, _ = averaged(motions, how, recipe.cutoff_hz)
+    means, _ = averaged(motions, recipe.cutoff_hz)
     return fit_logs(means, columns, recipe)
 
 

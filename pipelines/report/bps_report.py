@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipelines.estimation.balance import Balance
-from pipelines.estimation.comparison import Compared
 from pipelines.estimation.config import BalanceConfig
 from pipelines.estimation.nominal import column_in_words
 from pipelines.estimation.result import Estimated, Result
@@ -30,7 +29,6 @@ _POOR = 0.5  # one that explains too little to be used
 _SURE = 3.0  # standard deviations: a value that is clearly visible
 _ABOVE_NOISE = 10.0  # times the noise between periods, as in a diagnosis: the model lacks something
 _STANDS_OUT = 2.0  # times the overall relative error: a joint worth naming
-_ALIKE = 0.02  # of the better error: less is no difference worth speaking of
 _CURVES = 8  # in one axes
 _FAR = 4  # described values that are named
 
@@ -48,8 +46,6 @@ def bps_report(result: Result) -> Report:
     if result.noise_floor:
         sections.append(_noise_section(result))
     sections.append(_trust_section(result))
-    if result.comparison:
-        sections.append(_comparison_section(result))
     basis, verdict = (_say("friction", result),), _verdict(result)
     key, tone = _key_figures(result), _tone(result)
     return Report("Base parameters", verdict, tone, key, tuple(sections), basis=basis)
@@ -395,43 +391,3 @@ def draw_convergence(
     axis.set_ylabel("estimate / final estimate")
     if len(shown):
         legend_above(axis, 3)
-
-
-def _winner(comparison: tuple[Compared, ...]) -> tuple[str, ...]:
-    """Whether another way explains measurably better what was held out, and by how much."""
-    ranked = sorted((c for c in comparison if c.value), key=lambda c: c.validate)
-    used = next((c for c in ranked if c.used), None)
-    better = next((c for c in ranked if c.apart[1] < 0.0), None)
-    clearly = better
-    if used is None or better is None or not better.validate < (1.0 - _ALIKE) * used.validate:
-        clearly = None
-    low, high = (
-        (0.0, 0.0) if clearly is None else (-100 * clearly.apart[1], -100 * clearly.apart[0])
-    )
-    worse = [c.method for c in ranked if not c.used and c.apart[0] > 0.0]
-    return _paragraphs("winner", ranked, used, clearly, low, high, better is not None, worse)
-
-
-def _comparison_section(result: Result) -> Section:
-    rows = []
-    for c in result.comparison:
-        apart = f"{_signed(100 * c.apart[0])} … {_signed(100 * c.apart[1])}"
-        notes = [(c.used, "used here"), (c.tied, "as good as the best")]
-        said = c.failed or ", ".join(words for true, words in notes if true)
-        errors = (100 * c.identify, 100 * c.validate)
-        rows.append((c.method, *errors, "" if c.used or not c.value else apart, said))
-    columns = ("motion by", "fitted [%]", "held out [%]", "held out, minus the one used [%]", "")
-    caption = (
-        "Relative torque error on the same equations. The differences are intervals of 95 %, by "
-        "drawing the held-out stretches of time anew, the same ones for both."
-    )
-    tables = [Table(columns, tuple(rows), caption)]
-    if good := [c for c in result.comparison if c.value]:
-        values: dict[str, Sequence[Cell]] = {
-            c.method: [with_std(x, s) for x, s in zip(c.value, c.std, strict=True)] for c in good
-        }
-        count = len(good[0].value)
-        names = {"parameter": [figure_in_words(p.name) for p in result.parameters[:count]]}
-        tables.append(columns_table(names | values, "The same parameters, value ± std."))
-    title = "Four ways to reconstruct the motion"
-    return Section(title, _winner(result.comparison), tuple(tables))

@@ -23,7 +23,7 @@ from tests.healthy import begun
 from tests.seeds import rarely
 
 SHORT = run.Settings(skip=tuple(m.replace("_", "-") for m in run.STEPS if m not in ("inspect", "reconstruct", "frf")))
-LONG = run.Settings(skip=("diagnose", "extend"), stages={"estimate-bps": estimate_bps.Settings(compare=False),
+LONG = run.Settings(skip=("diagnose", "extend"), stages={"estimate-bps": estimate_bps.Settings(),
                                                          "validate-writing": validate_writing.Settings(simulate=False)})
 
 
@@ -228,7 +228,7 @@ def test_a_stage_reads_no_other_logs_than_it_says(module: str, samples: Path) ->
     stage = import_module(f"pipelines.{module}").STAGE
     settings = stage.in_run or stage.settings()
     if module == "estimate_bps":
-        settings = replace(settings, compare=False)
+        settings = replace(settings)
     if module == "validate_writing":
         settings = replace(settings, simulate=False)
     names = ("friction-1", "hold-1", "excitation-1", "excitation-2", "free-1")

@@ -15,7 +15,7 @@ from pipelines.stage import Outcome, Request, run_stage
 
 Result = estimate_bps.Result
 Settings = estimate_bps.Settings
-SYMMETRIC = Settings(symmetric=True, compare=False)
+SYMMETRIC = Settings(symmetric=True)
 
 
 def stage(folder: Path, *logs: ExperimentLog, settings: Settings = SYMMETRIC, check: bool = False,

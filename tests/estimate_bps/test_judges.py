@@ -9,17 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines import estimate_bps
 from pipelines.errors import InputRejected, UsageError
-from pipelines.estimation.comparison import Compared
 from pipelines.io.files import write_log
 from pipelines.io.log import ExperimentLog
 from pipelines.io.model_file import model_text
 from pipelines.io.robot import format_robot
 from pipelines.report.bps_report import bps_report
-from pipelines.stage import Request, run_stage
 from tests.cli.commands import rrrid
-from tests.estimate_bps.estimates import SYMMETRIC, Settings, of_elbow, stage
+from tests.estimate_bps.estimates import SYMMETRIC, of_elbow, stage
 from tests.healthy import with_signal
 from tests.model.estimation.experiments import arm, experiment, truth
 
@@ -43,22 +40,6 @@ def test_the_balance_of_power_finds_a_spoilt_acceleration(good: ExperimentLog, t
     balance = stage(tmp_path, good, settings=replace(SYMMETRIC, method="observer", bandwidth=(3.0,))).result.balance
     assert balance is not None
     assert not balance.agree
-
-
-@pytest.fixture(scope="module")
-def of_samples(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> estimate_bps.Result:
-    request = Request((samples / "rrr-closed-form",), out=tmp_path_factory.mktemp("samples") / "out", no_report=True)
-    return run_stage(estimate_bps.STAGE, request, Settings()).result
-
-
-def test_the_default_wins_held_out(of_samples: estimate_bps.Result) -> None:
-    """The table of four ways to reconstruct: none explains the held-out sample log better than the default, but for a trifle."""
-    result = of_samples
-    assert [c.method for c in result.comparison if c.used] == ["smoother"]
-    errors = {c.method: c.validate for c in result.comparison}
-    assert errors["smoother"] < 1.01 * min(errors.values()), errors
-    assert errors["smoother"] < 0.5 * errors["observer"]
-    assert result.held_out == "logs"
 
 
 def test_slow_samples_of_one_joint_leave_the_others_alone(good: ExperimentLog, tmp_path: Path) -> None:
@@ -115,49 +96,6 @@ def test_the_command_line(good: ExperimentLog, held_out: ExperimentLog, tmp_path
     assert json.loads(given.stdout)["friction"] == "given"
     missing = rrrid("estimate-bps", "good", "--out", "o3", "--model", "nowhere.json", cwd=tmp_path)
     assert (missing.returncode, "RRID-C04" in missing.stderr) == (2, True)
-
-
-@pytest.mark.parametrize(("alone", "min_speed"), [
-    (True, 0.5), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((False, 0.0), (True, 0.0), (False, 0.5)))])
-def test_all_ways_are_judged_by_the_same_equations(alone: bool, min_speed: float, good: ExperimentLog, held_out: ExperimentLog,
-                                                   tmp_path: Path) -> None:
-    settings = replace(SYMMETRIC, compare=True, min_speed=(min_speed,))
-    result = stage(tmp_path, *((good,) if alone else (good, held_out)), settings=settings).result
-    assert len({c.equations for c in result.comparison}) == 1
-    assert result.comparison[0].equations > 0
-
-
-def _compared(**errors: tuple[float, float, float]) -> tuple[Compared, ...]:
-    """Of each way its held-out error and the interval of its difference to the first, which is the one used."""
-    return tuple(Compared(name, k == 0, error, error, (low, high), low <= 0.0, 9, (1.0,), (0.1,), "")
-                 for k, (name, (error, low, high)) in enumerate(errors.items()))
-
-
-def test_the_report_names_a_better_way_only_where_it_is_measured(good: ExperimentLog, tmp_path: Path) -> None:
-    result = stage(tmp_path, good).result
-
-    def said(**errors: tuple[float, float, float]) -> str:
-        section = bps_report(replace(result, comparison=_compared(**errors))).sections[-1]
-        return section.text[0]
-
-    better = said(smoother=(0.05, 0.0, 0.0), observer=(0.04, -0.012, -0.008))
-    assert "observer is measurably better than smoother, which was used" in better
-    assert "0.8 to 1.2 percentage points" in better
-    assert "--method observer" in better
-    draw = "no way is measurably better than smoother, which was used"
-    assert said(smoother=(0.05, 0.0, 0.0), observer=(0.04, -0.021, 0.001)).endswith(f"{draw}.")
-    assert said(smoother=(0.04, 0.0, 0.0), other=(0.05, 0.008, 0.012)).endswith(f"{draw}; other is measurably worse.")
-    assert "better by more than a trifle than smoother" in said(smoother=(0.0401, 0.0, 0.0), observer=(0.04, -0.0002, -0.0001))
-
-
-def test_what_is_alike_is_called_so(of_samples: estimate_bps.Result) -> None:
-    """Sample logs of a fine encoder: smoother and zero-phase filter are indistinguishable, the observer is not."""
-    beside = {c.method: c for c in of_samples.comparison}
-    assert {name for name, c in beside.items() if c.tied} == {"smoother", "zero-phase"}
-    low, high = beside["zero-phase"].apart
-    assert low < beside["zero-phase"].validate - beside["smoother"].validate < high
-    assert low < 0.0 < high
-    assert beside["observer"].apart[0] > 0.5 * (beside["observer"].validate - beside["smoother"].validate)
 
 
 def test_the_verdict_names_the_worst_joint_and_what_is_small(good: ExperimentLog, tmp_path: Path) -> None:

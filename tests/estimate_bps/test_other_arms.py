@@ -71,7 +71,7 @@ def recorded(arm: Arm, seed: int = 0, *, sample_time: float = 2e-3, base_hz: flo
 
 def estimated(*logs: ExperimentLog, **settings: object) -> Result:
     opened = tuple(Opened(Path(log.name), "", log, ()) for log in logs)
-    return compute(Inputs(opened), Settings(compare=False, **settings))  # type: ignore[arg-type]
+    return compute(Inputs(opened), Settings(**settings))  # type: ignore[arg-type]
 
 
 def deviations(found: Result, arm: Arm, phi: Array, coulomb: float = COULOMB) -> Array:

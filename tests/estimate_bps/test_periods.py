@@ -9,18 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines import estimate_bps, reconstruct
 from pipelines.estimate_bps import Result, compute
-from pipelines.estimation.comparison import Beside
+from pipelines.estimation.mean_period import PeriodicLog
 from pipelines.io.files import Opened
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.io.results import decode, encode
 from pipelines.report.bps_report import bps_report
-from pipelines.stage import Inputs, Request, run_stage
+from pipelines.stage import Inputs
 from sample_logs.make_closed_form import NOISE, torque_step
-from tests.estimate_bps.estimates import SYMMETRIC, contents, stage
+from tests.estimate_bps.estimates import SYMMETRIC
 from tests.healthy import with_signal
-from tests.model.estimation.experiments import arm, experiment, looped, periodic, truth
+from tests.model.estimation.experiments import arm, experiment, periodic, truth
+from tests.seeds import rarely
 
 ENCODER = 1e-5
 
@@ -30,13 +29,13 @@ def estimated(*logs: ExperimentLog, **settings: object) -> Result:
     return compute(Inputs(opened), replace(SYMMETRIC, **settings))  # type: ignore[arg-type]
 
 
-def of_periods(seed: int, periods: int, encoder: float = 3e-6, average: bool = True) -> Result:
-    return _of_periods(seed, periods, encoder, average)
+def of_periods(seed: int, periods: int, encoder: float = 3e-6) -> Result:
+    return _of_periods(seed, periods, encoder)
 
 
 @lru_cache(maxsize=16)
-def _of_periods(seed: int, periods: int, encoder: float, average: bool) -> Result:
-    return estimated(periodic(seed, periods, encoder), average=average)
+def _of_periods(seed: int, periods: int, encoder: float) -> Result:
+    return estimated(periodic(seed, periods, encoder))
 
 
 def std_of(found: Result) -> Array:
@@ -49,7 +48,7 @@ def deviation(found: Result) -> Array:
     return (value - truth([p.name for p in found.parameters])) / std_of(found)
 
 
-def only(found: Result) -> Beside:
+def only(found: Result) -> PeriodicLog:
     (beside,) = found.noise_floor
     return beside
 
@@ -68,11 +67,10 @@ def test_five_periods_are_worth_the_root_of_five() -> None:
     assert max(five[0].equations) < 1.2 * max(one[0].equations)
 
 
-@pytest.mark.parametrize(("encoder", "average"), [
-    (3e-6, True), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((3e-6, False), (3e-5, True), (3e-5, False)))])
-def test_the_floor_is_the_noise_that_was_put_in(encoder: float, average: bool) -> None:
+@pytest.mark.parametrize("encoder", [3e-6, *rarely(3e-5)])
+def test_the_floor_is_the_noise_that_was_put_in(encoder: float) -> None:
     """Position and torque of one sample within 5 %; the model being right, the residual is what noise leaves, within 25 %."""
-    beside = only(of_periods(0, 5, encoder, average))
+    beside = only(of_periods(0, 5, encoder))
     np.testing.assert_allclose(beside.position, np.hypot(encoder, ENCODER / np.sqrt(12.0)), rtol=0.05)
     np.testing.assert_allclose(beside.torque, np.hypot(NOISE, torque_step(arm().robot) / np.sqrt(12.0)), rtol=0.05)
     np.testing.assert_allclose(beside.ratio, 1.0, atol=0.25)
@@ -108,36 +106,6 @@ def test_a_disturbed_period_is_left_out_and_named() -> None:
     np.testing.assert_allclose(only(found).ratio, 1.0, atol=0.25)
 
 
-def test_a_result_from_before_starts_were_looked_for_is_still_reported() -> None:
-    """Its periods say nothing of how long the motion took to settle: not known, and no reason to refuse the rest."""
-    text, series = encode(of_periods(0, 5))
-    for log in text["noise_floor"]:
-        del log["settling_time"]
-    old = decode(Result, text, series)
-    assert only(old).settling_time is None
-    assert "how long its motion took to settle is not known" in str(bps_report(old).sections)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_a_loop_that_settles_spoils_no_mean_of_two_periods(seed: int) -> None:
-    """From rest the shoulder sags by 5 to 10 mrad, for 0.3 s, and so does the held-out log.
-
-    Averaged into the mean, that made the held-out error of shoulder and elbow up to four times what it is without a mean.
-    """
-    logs = looped(seed, 2), looped(seed + 50, 2, "validate")
-    mean, every = (estimated(*logs, average=average, compare=False) for average in (True, False))
-    assert all(log.averaged and 0.1 <= log.settling_time <= 0.6 for log in mean.noise_floor)
-    assert (np.array(mean.torque_rms["validate"]) < 1.02 * np.array(every.torque_rms["validate"])).all()
-    assert [check.code for check in mean.data_quality if "in which the motion settled" in check.message] == ["RRID-T10"] * 2
-    assert [check.message for check in every.data_quality if check.code == "RRID-T10"] == [
-        f"the first {log.settling_time:.2g} s of its periods, in which the motion settled, are kept, for its periods are not "
-        "averaged" for log in every.noise_floor]
-    for found, fate in ((mean, "left out"), (every, "kept")):
-        assert f"its first {found.noise_floor[0].settling_time:.2g} s, in which the motion settled, are {fate}" in str(
-            bps_report(found).sections)
-
-
 def drifting(q: Array, tau: Array) -> None:
     """Friction of the shoulder that falls by 0.05 N m from period to period."""
     speed = np.gradient(q[:, 1], 1e-3)
@@ -167,15 +135,6 @@ def test_periods_that_are_not_alike_are_not_averaged(periods: int, spoil: object
 
 
 @pytest.mark.slow
-def test_without_averaging_every_sample_counts() -> None:
-    beside, found = only(of_periods(0, 5, average=False)), of_periods(0, 5, average=False)
-    assert not beside.averaged
-    assert beside.why_not == "not asked for"
-    assert max(found.equations) > 4 * max(of_periods(0, 5).equations)
-    assert not [check for check in found.data_quality if check.code == "RRID-T10"]
-
-
-@pytest.mark.slow
 def test_a_log_with_an_uneven_clock_is_folded_on_its_even_grid() -> None:
     log = periodic(0, 2)
     t = log.t + np.random.default_rng(3).uniform(-0.03, 0.03, log.n_samples) * 1e-3
@@ -194,21 +153,11 @@ def test_a_log_of_one_period_beside_one_of_five_counts_for_its_own() -> None:
     np.testing.assert_allclose(rms, np.sqrt((only(both).residual**2 * 5 + (NOISE / 5) ** 2) / 6), rtol=0.4)
 
 
-@pytest.mark.slow
-def test_derived_logs_give_what_recordings_give(tmp_path: Path) -> None:
-    """Averaged or not: `reconstruct` and then `estimate-bps` on its logs is `estimate-bps` on the recordings, bit for bit."""
-    direct = contents(stage(tmp_path / "h5", periodic(0, 2)).folder)
-    recorded = Request((tmp_path / "h5/logs",), out=tmp_path / "motion", no_report=True, format="parquet")
-    motion = run_stage(reconstruct.STAGE, recorded, replace(SYMMETRIC.reconstruction, average=False))
-    again = Request((motion.folder,), out=tmp_path / "again", no_report=True)
-    assert contents(run_stage(estimate_bps.STAGE, again, SYMMETRIC).folder) == direct
-
-
-@pytest.mark.slow
-def test_every_method_takes_the_same_mean() -> None:
-    """The table of methods compares them on the mean of the same periods: as many equations, least left by the smoother."""
-    rows = estimated(periodic(0, 3), compare=True).comparison
-    assert [row.failed for row in rows] == [""] * 4
-    assert len({row.equations for row in rows}) == 1
-    error = {row.method: row.validate for row in rows}
-    assert min(error, key=error.__getitem__) == "smoother"
+@pytest.mark.parametrize("period", [0.2, *rarely(0.1, 0.01, 7.3)])
+def test_a_wrong_period_is_told_and_changes_no_estimate(period: float) -> None:
+    """T10, and what a log without a period gives."""
+    log = periodic(0, 2)
+    none, found = estimated(replace(log, period=None)), estimated(replace(log, period=period))
+    said = [check for check in found.data_quality if check.message.startswith("its periods are not averaged")]
+    assert [check.code for check in said] == ["RRID-T10"]
+    np.testing.assert_allclose(std_of(found), std_of(none), rtol=1e-9)

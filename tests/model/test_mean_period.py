@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -75,48 +73,18 @@ def elbow_error(log: ExperimentLog) -> float:
     return float(np.abs(mean.motion.q[inside, 2] - one_period(0)[0][phase, 2]).max())
 
 
-def test_of_two_periods_the_start_alone_is_left_out() -> None:
-    """The mean is the true period to 1e-5 rad, not 0.01 beside it, and counts for a little less than two."""
-    log = settling(2, 0.1)
-    floor, made = mean_period(log, reconstruct(log, Reconstruction()), None)
-    assert floor is not None
-    assert made is not None
-    assert made[1].mean is not None
-    assert floor.left_out == ()
-    assert 0.5 <= floor.settling_time <= 1.0
-    assert made[1].mean.periods == pytest.approx(2.0 - floor.settling_time / 10.0, abs=0.01)
-    assert elbow_error(log) < 2e-5
-    (check,) = doubts(floor, "log")
-    assert f"the first {floor.settling_time:.2g} s" in check.message
-    (kept,) = doubts(floor, "log", averaged=False)
-    assert kept.message == check.message.replace("left out of their mean", "kept, for its periods are not averaged")
-    drifts, start = doubts(replace(floor, unlike="they drift"), "log")
-    assert (drifts.message, start.message) == ("its periods are not averaged: they drift", kept.message)
-
-
-def test_where_a_lead_precedes_them_two_whole_periods_remain() -> None:
-    log = settling(2, 0.1, lead=1500)
-    floor, made = mean_period(log, reconstruct(log, Reconstruction()), None)
-    assert floor is not None
-    assert made is not None
-    assert made[1].mean is not None
-    assert floor.settling_time > 0.0
-    assert made[1].mean.periods == 2.0
-    assert elbow_error(log) < 2e-5
-
-
 @pytest.mark.slow
 def test_of_three_periods_the_first_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """A start of 0.6 mrad, too small to make its period an odd one: two others remain, whose mean has nothing of it."""
     log = settling(3, 0.1, size=6e-4)
     floor, _ = mean_period(log, reconstruct(log, Reconstruction()), None)
     assert floor is not None
-    assert (floor.left_out, floor.settling_time, floor.periods) == ((1,), 0.0, 2)
+    assert (floor.left_out, floor.periods) == ((1,), 2)
     assert elbow_error(log) < 2e-5
-    monkeypatch.setattr(Periods, "settling", lambda *given: 0)
+    monkeypatch.setattr(Periods, "begins_apart", lambda *given: False)
     floor, _ = mean_period(log, reconstruct(log, Reconstruction()), None)
     assert floor is not None
-    assert (floor.left_out, floor.settling_time, floor.periods) == ((), 0.0, 3)
+    assert (floor.left_out, floor.periods) == ((), 3)
     assert elbow_error(log) > 3e-5
 
 
@@ -136,7 +104,7 @@ def test_noise_that_is_larger_in_a_part_of_the_period_is_no_start(periods: int, 
     floor, made = mean_period(log, reconstruct(log, Reconstruction()), None)
     assert floor is not None
     assert made is not None
-    assert (floor.left_out, floor.settling_time, floor.periods, floor.unlike) == ((), 0.0, periods, "")
+    assert (floor.left_out, floor.periods, floor.unlike) == ((), periods, "")
 
 
 def test_two_periods_that_never_settle_are_not_averaged() -> None:
@@ -148,18 +116,3 @@ def test_two_periods_that_never_settle_are_not_averaged() -> None:
     (check,) = doubts(floor, "log")
     assert check.code == "RRID-T10"
     assert "not averaged" in check.message
-
-
-def test_a_start_is_left_out_of_a_period_that_cannot_be_spared() -> None:
-    """Both later periods lack the same tenth of a second, which the first one has: its start alone goes."""
-    log = settling(3, 0.1)
-    q = log.q.copy()
-    for later in (1, 2):
-        q[later * 10_000 + 5000:later * 10_000 + 5100] = np.nan
-    log = with_signal(log, q=q)
-    floor, made = mean_period(log, reconstruct(log, Reconstruction()), None)
-    assert floor is not None
-    assert made is not None
-    assert (floor.left_out, floor.periods) == ((), 3)
-    assert floor.settling_time > 0.0
-    assert elbow_error(log) < 2e-5

@@ -225,7 +225,7 @@ def test_milliseconds_taken_for_seconds_hide_friction_as_an_estimate_says() -> N
     (check,) = [c for c in plausibility(Subject(slow)) if c.code == "RRID-D09"]
     assert check.gate
     found = estimate_bps.compute(Inputs((Opened(Folder("slow.h5"), "", slow, ()),), label="logs"),
-                                 estimate_bps.Settings(compare=False))
+                                 estimate_bps.Settings())
     assert found.unresolved
     assert found.unresolved in check.message
     assert "Coulomb friction at joint 2 and viscous friction at joint 2 cannot be separated" in found.unresolved

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipelines import estimate_bps
-from pipelines.estimation.comparison import Beside
+from pipelines.estimation.mean_period import PeriodicLog
 from pipelines.estimation.result import Result
 from pipelines.report.bps_report import bps_report
 from pipelines.report.render import render_report
@@ -20,7 +20,7 @@ from pipelines.stage import Request, run_stage
 def result(tmp_path_factory: pytest.TempPathFactory) -> Result:
     log = Path(__file__).resolve().parents[2] / "sample_logs/rrr-closed-form/excitation-1.h5"
     request = Request((log,), out=tmp_path_factory.mktemp("bps") / "out", no_report=True)
-    return run_stage(estimate_bps.STAGE, request, estimate_bps.Settings(compare=False)).result
+    return run_stage(estimate_bps.STAGE, request, estimate_bps.Settings()).result
 
 
 def page(result: Result) -> str:
@@ -41,7 +41,7 @@ def test_a_good_estimate_is_called_good(result: Result) -> None:
 def test_a_residual_far_above_the_noise_is_not_called_good(result: Result) -> None:
     """44 times what the noise between periods leaves: the torque error is as small as before, and the model lacks something."""
     n = np.ones(len(result.joints))
-    log = Beside("a", "identify", 3, True, "", (), n, n, n, n, n, 44.0 * n, 44.0 * n)
+    log = PeriodicLog("a", "identify", 3, True, "", (), n, n, n, n, n, 44.0 * n, 44.0 * n)
     report = bps_report(replace(result, noise_floor=(log,)))
     assert report.tone == "attention"
     assert "44 times what the noise between periods leaves" in report.verdict
