@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.dynamics.body import Motion
-from pipelines.errors import Check, InputRejected
+from pipelines.errors import Check, InputRejected, Level
 from pipelines.estimation.config import MeanPeriodConfig
 from pipelines.estimation.estimate import Fitted, Judged
 from pipelines.estimation.filters import passed_both_ways
@@ -123,7 +123,7 @@ def doubts(floor: NoiseFloor | None, where: object) -> list[Check]:
         words = f"period {odd} differs from the {floor.periods} others and is left out of their "
         words += "mean"
         remedy = "the first one often starts from rest; or somebody touched the arm"
-        level = "ok" if floor.left_out == (1,) else "warn"
+        level: Level = "ok" if floor.left_out == (1,) else "warn"
         found.append(Check.of("T10", level, words, where=where, remedy=remedy))
     return found
 

@@ -317,6 +317,11 @@ class LogEquations:
         reach = 2.0 * _CONFIG.touched / how.cutoff_hz if how.cutoff_hz else _CONFIG.memory
         return int(np.ceil(reach / (step * how.decimation)))
 
+    def moments(self) -> Indices:
+        """Return the sample of the recording of every equation."""
+        every = np.concatenate([self._moments(run) for run in self.runs])
+        return np.asarray(self.found.good.kept[every])
+
     def _moments(self, run: slice) -> Indices:
         """Return the samples of the mended log that make equations of any joint."""
         end, every = int(self.held), self.conditioning.decimation
