@@ -60,7 +60,7 @@ def asked(folder: Path) -> dict[str, Any]:
     prepared = with_terms_told_apart(prepare(chosen, rows), settings.blocks)
     known = facts(
         found.residual_rms.validate,
-        found.noise_floor_origin != "blocks",
+        found.noise_floor_origin == "reference logs",
         prepared,
         nominal_estimate(prepared),
     )

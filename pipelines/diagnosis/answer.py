@@ -71,7 +71,7 @@ def answer(
         worth.rms(0),
         "what has changed" if reference else "what is wrong",
         "blocks" if prepared.judge is None else "logs",
-        "reference logs" if reference else "blocks",
+        worth.floor_origin,
         reason,
         worth.rms(last),
         _ledger(found),

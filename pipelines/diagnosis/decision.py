@@ -219,7 +219,7 @@ def limited_by_estimate(found: Diagnosis, prepared: Prepared) -> Diagnosis:
         return found
     estimated = nominal_estimate(prepared)
     found = replace(found, checks=negative_viscous(estimated, prepared.logs.identify[0].robot_name))
-    left, floor = found.residual_rms.validate, found.noise_floor_origin != "blocks"
+    left, floor = found.residual_rms.validate, found.noise_floor_origin == "reference logs"
     why = cannot_judge(facts(left, floor, prepared, estimated)) if nothing else ""
     return replace(found, verdict="cannot-judge", reason=why) if why else found
 

@@ -20,6 +20,7 @@ from pipelines.diagnosis.result import (
     BeforeAfter,
     Extended,
     Finding,
+    FloorOrigin,
     Gain,
     ResidualRms,
     TipError,
@@ -34,10 +35,13 @@ from pipelines.estimation.exact_model import Named
 from pipelines.estimation.joint_table import Array
 from pipelines.estimation.model_fit import Refined, TorqueGain, torque_gain_of
 from pipelines.estimation.preparation import Prepared
+from pipelines.estimation.repeated_states import Repeated
 from pipelines.estimation.residual_analysis import Proof, proof
 from pipelines.simulation.comparison import Simulation, simulation_errors
 
 __all__ = ["Worth", "alternatives_of", "extension_of", "findings_of", "gain_of", "weigh"]
+
+_LEAST_NOISE = 1e-6  # numerics: of a residual; logs that were computed may have none
 
 
 def gain_of(torque: TorqueGain, before: Simulation, after: Simulation) -> Gain:
@@ -60,6 +64,7 @@ class Worth:
     left: tuple[Array, ...]  # (rows,) [N m] of each model, held out
     simulated: tuple[Simulation, ...]  # each model, under the controllers of the held-out logs
     floor: Array  # (joints,) [N m]
+    floor_origin: FloorOrigin
     whole: bool  # with figures
     standing: tuple[Told, ...] = ()  # baseline effects
 
@@ -83,20 +88,31 @@ class Worth:
 
 
 def weigh(prepared: Prepared, trained: Trained, standing: Standing, whole: bool) -> Worth:
-    """Return what the models are worth on held-out rows.
-
-    The floor is the residual of the healthy machine; without reference logs, the residual of the
-    last model on the rows that it was fitted to.
-    """
+    """Return what the models are worth on held-out rows."""
     arms = [trained.arm(k) for k in range(len(trained.models))]
     simulated = (
         simulation_errors(arms, prepared.judging or prepared.motions)
         if whole
         else [Simulation.none(arm.n_joints) for arm in arms]
     )
-    floor = trained.models[-1].rms if standing.floor is None else standing.floor
     left = tuple(trained.held_out(k) for k in range(len(arms)))
-    return Worth(trained, left, tuple(simulated), floor, whole, standing.told)
+    floor, origin = _noise_floor(trained, standing)
+    return Worth(trained, left, tuple(simulated), floor, origin, whole, standing.told)
+
+
+def _noise_floor(trained: Trained, standing: Standing) -> tuple[Array, FloorOrigin]:
+    """Return the noise floor (joints,) [N m], and where it comes from.
+
+    It is the residual of the healthy machine; without reference logs, what the residual of the last
+    model differs by between rows of one state; without such rows, all of that residual.
+    """
+    if standing.floor is not None:
+        return standing.floor, "reference logs"
+    done = trained.models[-1]
+    noise = np.sqrt(Repeated.of(done.data).noise(done.left))
+    if np.isfinite(noise).all():
+        return np.minimum(np.maximum(noise, _LEAST_NOISE * done.rms), done.rms), "repeated motion"
+    return done.rms, "blocks"
 
 
 def findings_of(

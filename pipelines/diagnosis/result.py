@@ -48,6 +48,7 @@ __all__ = [
 
 Verdict = Literal["cause", "no-fault-found", "unknown", "cannot-judge"]
 JudgedBy = Literal["logs", "blocks"]
+FloorOrigin = Literal["reference logs", "repeated motion", "blocks"]
 
 
 @dataclass(frozen=True)
@@ -229,7 +230,7 @@ class Diagnosis:
     residual_rms: ResidualRms
     question: Literal["what is wrong", "what has changed"]
     held_out: JudgedBy
-    noise_floor_origin: str  # "reference logs" | "blocks"
+    noise_floor_origin: FloorOrigin  # "blocks": the residual of the final model itself
     reason: str  # of "unknown" and "cannot-judge"; what remains beside causes
     after_rms: ResidualRms  # the same with all findings and baseline effects
     candidate_causes: tuple[Trial, ...]

@@ -175,13 +175,13 @@ def _advice(result: Result) -> tuple[str, ...]:
 
 
 def _is_noise(found: Diagnosis) -> bool:
-    """Whether the floor is the noise of the residual: there are no reference logs."""
-    return found.noise_floor_origin == "blocks"
+    """Return whether the floor is noise of the residual: there are no reference logs."""
+    return found.noise_floor_origin != "reference logs"
 
 
 def floor_words(found: Diagnosis) -> str:
     """Return where the noise floor comes from."""
-    return _say("floor", _is_noise(found))
+    return _say("floor", found.noise_floor_origin)
 
 
 def what_stays(found: Diagnosis) -> str:
