@@ -20,12 +20,11 @@ import numpy as np
 from pipelines.errors import Check, InputRejected, RrridError, UsageError, did_you_mean
 from pipelines.io.config import URDF
 from pipelines.io.sandbox import TomlError, parse_toml
-from pipelines.io.schema import Array, Strict, adapter, described, fault_in_words
+from pipelines.io.schema import Strict, adapter, described, fault_in_words
 
 Vector = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]
 
-_CORRECT = "correct the robot description"
 _TEXT = r"^[^\x00]*[^\x00\s][^\x00]*$"
 
 # In a wheel the files lie inside the package; in a checkout in sample_logs/.
@@ -140,22 +139,24 @@ def parse_robot(text: str, *, where: object = "", inside_log: bool = False) -> R
     from pydantic import ValidationError
 
     fail: type[RrridError] = InputRejected if inside_log else UsageError
+    remedy = "correct the robot description"
     try:
         table = parse_toml(text)
-        if lacks := _incomplete(table):
-            raise fail("C02", f"robot description, {lacks[0]}", where, lacks[1])
-        found: _Table = adapter(_Table).validate_json(json.dumps(table, default=str))  # of dates
+        words = _missing(table)
+        found: _Table | None = None
+        if not words:
+            found = adapter(_Table).validate_json(json.dumps(table, default=str))  # of dates
+            words = _impossible(found)
     except TomlError as problem:
         words = f"the robot description is not valid TOML: {problem}"
         raise fail("C01", words, where, "correct it at that place") from None
     except ValidationError as problem:
-        kind, words = fault_in_words(
-            problem, _Table, _Kinematics, Joint, LinkParameters, Drive, first=1
-        )
+        kinds = (_Table, _Kinematics, Joint, LinkParameters, Drive)
+        kind, words = fault_in_words(problem, *kinds, first=1)
         code = "C01" if kind == "unknown" else "C02"
-        raise fail(code, f"robot description, {words}", where, _CORRECT) from None
-    if impossible := _impossible(found):
-        raise fail("C02", f"robot description, {impossible[0]}", where, impossible[1])
+        raise fail(code, f"robot description, {words}", where, remedy) from None
+    if words or found is None:
+        raise fail("C02", f"robot description, {words}", where, remedy)
     own = found.kinematics
     return RobotDescription(
         found.name,
@@ -169,52 +170,43 @@ def parse_robot(text: str, *, where: object = "", inside_log: bool = False) -> R
     )
 
 
-def _incomplete(table: Mapping[str, Any]) -> tuple[str, str] | None:
-    """Say at once all that a joint lacks, and of a URDF that only its file can reach."""
+def _missing(table: Mapping[str, Any]) -> str:
+    """Return all that a joint lacks, and of a URDF what only its file can give; "" for nothing."""
     kinematics, joints = table.get("kinematics"), table.get("joint")
     if not isinstance(kinematics, dict) or not isinstance(joints, list):
-        return None
+        return ""
     if "urdf" in kinematics:
-        words = "kinematics.urdf: names a file, which a text on its own cannot reach"
-        return words, "load the description from its file, so that the URDF can be embedded"
-    urdf = kinematics.get("convention") == "urdf"
-    if urdf and "urdf_text" not in kinematics:
-        return "kinematics.urdf_text: is missing with convention 'urdf'", _CORRECT
-    wanted = ("name", "type") if urdf else ("name", "type", "a", "alpha", "d", "offset")
+        return "kinematics.urdf: names a file; load the description from its own file"
+    wanted = ["name", "type", "a", "alpha", "d", "offset"]
+    if kinematics.get("convention") == "urdf":
+        wanted = wanted[:2]
+        if "urdf_text" not in kinematics:
+            return "kinematics.urdf_text: is missing with convention 'urdf'"
     for index, joint in enumerate(joints, 1):
         missing = [key for key in wanted if isinstance(joint, dict) and key not in joint]
         if missing:
             verb = "is" if len(missing) == 1 else "are"
-            example = {"name": '"elbow"', "type": '"revolute"', "a": "0.4"}
-            least = ", ".join(f"{key} = {example.get(key, '0.0')}" for key in wanted)
-            words = f"joint[{index}]: {', '.join(missing)} {verb} missing"
-            return words, f"write at least: [[joint]] {least}, a line each"
-    return None
+            return f"joint[{index}]: {', '.join(missing)} {verb} missing"
+    return ""
 
 
-def _impossible(table: _Table) -> tuple[str, str] | None:
-    """Say what has another unit, an empty range, or another number of joints."""
+def _impossible(table: _Table) -> str:
+    """Return what has another unit, an empty range, or another number of joints; "" for nothing."""
     for index, joint in enumerate(table.joint, 1):
         place = f"joint[{index}]"
         if abs(joint.alpha) > 2 * math.pi:
-            words = f"{place}.alpha: is {joint.alpha:g} rad: looks like degrees"
-            return words, "write it in rad"
+            return f"{place}.alpha: is {joint.alpha:g} rad: looks like degrees"
         for key, length in (("a", joint.a), ("d", joint.d)):
             if abs(length) > URDF.longest:
-                return f"{place}.{key}: is {length:g} m: looks like mm", "write it in m"
+                return f"{place}.{key}: is {length:g} m: looks like mm"
         low, high = joint.position
         if not low < high:
-            words = f"{place}.position: its lower end {low} is not below its upper end {high}"
-            return words, _CORRECT
+            return f"{place}.position: its lower end {low} is not below its upper end {high}"
     n, drive = len(table.joint), table.drive or Drive()
-    for key, value in (
-        ("transmission", drive.transmission),
-        ("torque_constant", drive.torque_constant),
-        *(("transmission", row) for row in drive.transmission or ()),
-    ):
-        if value is not None and len(value) != n:
-            return f"drive.{key}: a row of {len(value)} for {n} joints", _CORRECT
-    return None
+    matrix = drive.transmission or ()
+    rows = (drive.transmission, drive.torque_constant, *matrix)
+    lengths = {len(row) for row in rows if row is not None}
+    return f"drive: a row of {max(lengths - {n})} for {n} joints" if lengths - {n} else ""
 
 
 def format_robot(robot: RobotDescription) -> str:
@@ -240,16 +232,20 @@ def _without_none(value: Any) -> Any:
     return [_without_none(item) for item in value] if isinstance(value, list) else value
 
 
-def inconsistency(mass: float, inertia: Array) -> str:
-    """Return why no rigid body has this mass [kg] and inertia (3, 3) [kg m^2]; "" where one has.
+def inconsistency_of_link(link: LinkParameters) -> str:
+    """Return why no rigid body has the parameters of a link; "" where one has.
 
-    The inertia is about the centre of mass. A body exists where m > 0 and the second moment of its
-    density, Σ = ½ tr(I) 1 - I, has no negative eigenvalue (Wensing, Kim and Slotine 2018,
+    With I_c = I_o - m (|c|² 1 - c cᵀ), a body exists where m > 0 and the second moment of its
+    density, Σ = ½ tr(I_c) 1 - I_c, has no negative eigenvalue (Wensing, Kim and Slotine 2018,
     pseudo-inertia): with the principal moments A ≤ B ≤ C, that is A ≥ 0 and C ≤ A + B.
     """
-    smallest, middle, largest = np.linalg.eigvalsh(0.5 * (inertia + inertia.T))
+    xx, yy, zz, xy, xz, yz = link.inertia
+    about_origin = np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]])
+    com = np.array(link.com)
+    shift = link.mass * (com @ com * np.eye(3) - np.outer(com, com))
+    smallest, middle, largest = np.linalg.eigvalsh(about_origin - shift)
     allowed = URDF.rounding * float(np.abs([smallest, middle, largest]).sum())
-    if mass <= 0.0 and largest > 0.0:
+    if link.mass <= 0.0 and largest > 0.0:
         return "an inertia without mass"
     if smallest < -allowed:
         return f"a negative moment of inertia, {smallest:.3g} kg m^2"
@@ -257,18 +253,6 @@ def inconsistency(mass: float, inertia: Array) -> str:
         others = f"above the sum of the two others, {smallest + middle:.3g}"
         return f"a moment of inertia, {largest:.3g} kg m^2, {others}"
     return ""
-
-
-def inconsistency_of_link(link: LinkParameters) -> str:
-    """Return the same for a link, whose inertia is about its frame's origin.
-
-    I_c = I_o - m (|c|² 1 - c cᵀ); products of inertia have the sign of +∫xy dm.
-    """
-    xx, yy, zz, xy, xz, yz = link.inertia
-    about_origin = np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]])
-    com = np.array(link.com)
-    shift = link.mass * (com @ com * np.eye(3) - np.outer(com, com))
-    return inconsistency(link.mass, about_origin - shift)
 
 
 def shipped_names(kind: str) -> list[str]:

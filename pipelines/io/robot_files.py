@@ -33,16 +33,21 @@ def load_robot(source: str | Path, tip_link: str | None = None) -> RobotDescript
     is_urdf = path.suffix.lower() in _URDF
     text = "" if is_urdf else read_small_text(path, what="a robot description (TOML) or a URDF")
     if is_urdf or text.lstrip("\ufeff \t\n").startswith("<"):
-        return _from_urdf(path, tip)
-    if tip:
+        robot = _from_urdf(path, tip)
+    elif tip:
         words = "the link at which the arm ends is given for a URDF, and this is a description"
         raise UsageError("C02", words, source, f'write tip_link = "{tip}" under [kinematics] in it')
-    table = _table_of(text)
-    _refuse_recipe(table, path)
-    if _urdf_in(table) is not None:
-        return _with_urdf(table, path)
-    robot = parse_robot(text, where=path)
-    return robot if robot.urdf_text else replace(robot, checks=_impossible_links(robot, path))
+    elif _urdf_in(text) is not None:
+        robot = _with_urdf(parse_toml(text), path)
+    else:
+        robot = parse_robot(text, where=path)
+    checks = []
+    for joint in robot.joints:
+        if joint.link is not None and (words := inconsistency_of_link(joint.link)):
+            words = f"no rigid body has the inertial parameters of joint '{joint.name}': {words}"
+            remedy = "correct its link: what is known of the links is used"
+            checks.append(Check.of("S17", "warn", words, path, remedy))
+    return replace(robot, checks=tuple(checks))
 
 
 def robot_sources(source: str | Path) -> tuple[Path, ...]:
@@ -50,8 +55,8 @@ def robot_sources(source: str | Path) -> tuple[Path, ...]:
     path, _ = _file_and_tip(source)
     if path.suffix.lower() in (*_URDF, *ENDINGS):
         return (path,)
-    urdf = _urdf_in(_table_of(read_small_text(path)))
-    return (path,) if urdf is None else (path, _split_file(path.parent / urdf)[0])
+    urdf = _urdf_in(read_small_text(path))
+    return (path,) if urdf is None else (path, _split(path.parent / urdf)[0])
 
 
 def split_tip(source: str) -> tuple[str, str | None]:
@@ -67,7 +72,7 @@ def robot_at_hand() -> tuple[str, str]:
     return "rrr", "none was named, and no robot.toml is here: the shipped rrr"
 
 
-def _split_file(path: Path) -> tuple[Path, str | None]:
+def _split(path: Path) -> tuple[Path, str | None]:
     """Return file and link of a path whose name may end in a link, unless it is there as it is."""
     file, tip = (str(path), None) if os.path.lexists(path) else split_tip(str(path))
     return Path(file), tip
@@ -77,52 +82,19 @@ def _file_and_tip(source: str | Path) -> tuple[Path, str | None]:
     if not str(source):
         remedy = "name a description, a URDF, or a shipped robot"
         raise UsageError("C02", "empty", "--robot", remedy)
-    path, tip = _split_file(Path(source))
-    if os.path.lexists(path) and not os.path.isdir(path):
-        return path, tip
-    try:
-        return shipped("robots", str(path)), tip
-    except UsageError as problem:
-        if os.path.isdir(path):
-            problem.message = "a folder, not the description of a robot"
-        raise
+    path, tip = _split(Path(source))
+    if os.path.isdir(path):
+        words = "a folder, not the description of a robot"
+        raise UsageError("C04", words, path, "name a file, or a shipped robot")
+    return (path if os.path.lexists(path) else shipped("robots", str(path))), tip
 
 
-def _table_of(text: str) -> dict[str, Any]:
-    """Return the table of a TOML text; empty for none, which `parse_robot` says better."""
+def _urdf_in(text: str) -> str | None:
+    """Return the URDF that the text of a description names; what is no TOML names none."""
     try:
-        return parse_toml(text)
+        kinematics = parse_toml(text).get("kinematics")
     except TomlError:
-        return {}
-
-
-def _refuse_recipe(table: dict[str, Any], path: Path) -> None:
-    """Refuse a recipe of `rrrid import` where the robot is wanted (C02)."""
-    if "kinematics" in table or not {"log", "file", "time", "signals"} & set(table):
-        return
-    remedy, robot = "give a robot description (TOML), a URDF or a shipped robot", table.get("robot")
-    if isinstance(robot, dict) and isinstance(use := robot.get("use"), str):
-        use = str(path.parent / use) if os.path.lexists(path.parent / use) else use
-        tip = robot.get("tip_link")
-        remedy = f"give the robot that it names: {f'{use}:{tip}' if tip else use}"
-    words = "this is a recipe of rrrid import, not a robot description"
-    raise UsageError("C02", words, path, remedy)
-
-
-def _impossible_links(robot: RobotDescription, path: Path) -> tuple[Check, ...]:
-    """Warn of every link of a description that no rigid body can be (S20)."""
-    checks = []
-    for joint in robot.joints:
-        if joint.link is not None and (words := inconsistency_of_link(joint.link)):
-            words = f"no rigid body has the inertial parameters of joint '{joint.name}': {words}"
-            remedy = "correct its link: what is known of the links is used"
-            checks.append(Check.of("S20", "warn", words, path, remedy))
-    return tuple(checks)
-
-
-def _urdf_in(table: dict[str, Any]) -> str | None:
-    """Return the URDF that a description names."""
-    kinematics = table.get("kinematics")
+        return None
     named = kinematics.get("urdf") if isinstance(kinematics, dict) else None
     return named if isinstance(named, str) else None
 
@@ -132,7 +104,7 @@ def _with_urdf(table: dict[str, Any], path: Path) -> RobotDescription:
     import tomli_w
 
     kinematics = table["kinematics"]
-    file, tip = _split_file(path.parent / kinematics.pop("urdf"))
+    file, tip = _split(path.parent / kinematics.pop("urdf"))
     given = kinematics.get("tip_link")
     arm = _from_urdf(file, given if isinstance(given, str) else tip)
     kinematics["urdf_text"] = arm.urdf_text
@@ -150,7 +122,7 @@ def _with_urdf(table: dict[str, Any], path: Path) -> RobotDescription:
             if getattr(mine, key) == getattr(plain, key)
         }
         joints.append(replace(mine, type=urdf.type, **filled))
-    return replace(described, joints=tuple(joints), tip_link=arm.tip_link, checks=arm.checks)
+    return replace(described, joints=tuple(joints), tip_link=arm.tip_link)
 
 
 def _from_urdf(path: Path, tip_link: str | None) -> RobotDescription:

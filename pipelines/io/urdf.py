@@ -7,24 +7,32 @@ chain = chain_from_urdf(robot.urdf_text)     the placements of the joints, for g
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, field
 from pathlib import Path
-from xml.etree.ElementTree import Element, TreeBuilder
-from xml.parsers import expat
+from typing import NoReturn
+from xml.etree.ElementTree import (
+    Element,
+    ParseError,
+    SubElement,
+    TreeBuilder,
+    XMLParser,
+    indent,
+    tostring,
+)
 
 import numpy as np
 
-from pipelines.errors import Check, InputRejected, UsageError, did_you_mean
+from pipelines.errors import InputRejected, UsageError, did_you_mean
 from pipelines.io.config import URDF
-from pipelines.io.robot import Joint, LinkParameters, RobotDescription, inconsistency
+from pipelines.io.robot import Joint, LinkParameters, RobotDescription
+from pipelines.io.sandbox import regular_file
 from pipelines.io.schema import Array
 
 _MOVING = ("revolute", "continuous", "prismatic")
 _TYPES = (*_MOVING, "fixed", "planar", "floating")
+_KEPT = ("origin", "parent", "child", "axis", "limit")
 _OTHER_FORMATS = {"mujoco": "an MJCF model (MuJoCo)", "sdf": "an SDF model (Gazebo)"}
-_OTHER_FORMATS |= {"mujocoinclude": "a part of an MJCF model (MuJoCo)"}
-_SERIAL = "only serial arms can be described"
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +60,12 @@ class UrdfChain:
 class _Joint:
     """A joint of the file, moving or fixed."""
 
+    element: Element
     name: str
     type: str
     parent: str
     child: str
-    xyz: Array  # (3,) [m]
-    rpy: Array  # (3,) [rad]
+    origin: tuple[Array, Array]  # xyz [m], rpy [rad]
     axis: Array  # (3,) unit vector
     range: tuple[float, float]
     velocity: float
@@ -70,8 +78,8 @@ class _Joint:
 
     @property
     def independent(self) -> bool:
-        """Return whether its one coordinate is its own."""
-        return self.type in _MOVING and not self.mimics
+        """Return whether it is fixed, or its one coordinate is its own."""
+        return not self.moves or (self.type in _MOVING and not self.mimics)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,23 +90,16 @@ class _Tree:
     links: dict[str, Element]
     into: dict[str, _Joint]  # by child link
     root: str
-    where: str  # the file, or "urdf_text"
+    out_of: dict[str, list[_Joint]] = field(default_factory=dict)  # by parent link
 
-    def below(self, link: str, *, fixed: bool = False, stop: tuple[str, ...] = ()) -> list[str]:
-        """Return `link` and all links below it, or those `fixed` to it; `stop` names joints."""
+    def body(self, link: str, stop: frozenset[str] | None = None) -> list[str]:
+        """Return `link` and the links fixed to it; or all below it but behind joints in `stop`."""
         found = [link]
         for name in found:  # grows meanwhile
-            for joint in self.into.values():
-                if joint.parent == name and joint.name not in stop and not (fixed and joint.moves):
+            for joint in self.out_of.get(name, ()):
+                if joint.name not in stop if stop is not None else not joint.moves:
                     found.append(joint.child)
         return found
-
-    def onwards(self, link: str) -> list[_Joint]:
-        """Return the moving joints that leave the body of `link`."""
-        body = self.below(link, fixed=True)
-        return [
-            one for name in body for one in self.into.values() if one.parent == name and one.moves
-        ]
 
     def way(self, link: str) -> list[_Joint]:
         """Return the joints from the root to `link`."""
@@ -117,13 +118,18 @@ def import_urdf(path: str | Path, tip_link: str | None = None) -> RobotDescripti
 
     Raises:
         UsageError: no such file, not a URDF, or not a serial arm.
+        InputRejected: F12, not a regular file.
     """
     path = Path(path)
+    if path.suffix.lower() == ".xacro":
+        _refuse_xacro(path, UsageError)
+    if regular_file(path, what="a URDF", empty=True).st_size > URDF.size:
+        raise UsageError("X13", f"larger than {URDF.size // 1_000_000} MB", path, "give a URDF")
     try:
-        tree = _tree_of(_read(path), str(path))
-        way, tip = _way_to_tip(tree, tip_link)
+        tree = _tree(path.read_bytes())
+        way, tip = _way_to_tip(tree, tip_link, path.name)
         moving = [joint for joint in way if joint.moves]
-        stop = tuple(joint.name for joint in moving)
+        stop = frozenset(joint.name for joint in moving)
         joints = tuple(
             Joint(
                 joint.name,
@@ -135,14 +141,11 @@ def import_urdf(path: str | Path, tip_link: str | None = None) -> RobotDescripti
             )
             for joint in moving
         )
-        checks = _impossible_links(tree)
     except InputRejected as problem:
         code = problem.code.removeprefix("RRID-")
         raise UsageError(code, problem.message, path, problem.remedy) from None
-    gravity, text = (0.0, 0.0, -9.81), _canonical(tree, way)
-    return RobotDescription(
-        tree.name, gravity, "urdf", joints, urdf_text=text, tip_link=tip, checks=checks
-    )
+    text, gravity = _canonical(tree, way), (0.0, 0.0, -9.81)
+    return RobotDescription(tree.name, gravity, "urdf", joints, urdf_text=text, tip_link=tip)
 
 
 def chain_from_urdf(urdf_text: str, tip_link: str | None = None) -> UrdfChain:
@@ -151,11 +154,11 @@ def chain_from_urdf(urdf_text: str, tip_link: str | None = None) -> UrdfChain:
     Raises:
         InputRejected: the text is not the URDF of a serial arm.
     """
-    way, tip = _way_to_tip(_tree_of(urdf_text, "urdf_text"), tip_link)
+    way, tip = _way_to_tip(_tree(urdf_text), tip_link)
     placed: list[JointPlacement] = []
     rotation, position = np.eye(3), np.zeros(3)
     for joint in way:
-        rotation, position = _placed(rotation, position, joint.xyz, joint.rpy)
+        rotation, position = _placed(rotation, position, joint.origin)
         if joint.moves:
             slides = joint.type == "prismatic"
             placed.append(JointPlacement(joint.name, slides, rotation, position, joint.axis))
@@ -163,8 +166,11 @@ def chain_from_urdf(urdf_text: str, tip_link: str | None = None) -> UrdfChain:
     return UrdfChain(tuple(placed), tip, rotation, position)
 
 
-def _placed(rotation: Array, position: Array, xyz: Array, rpy: Array) -> tuple[Array, Array]:
-    """Return a frame at `xyz`, `rpy` of another: R = Rz(yaw) Ry(pitch) Rx(roll), fixed axes."""
+def _placed(
+    rotation: Array, position: Array, origin: tuple[Array, Array]
+) -> tuple[Array, Array]:
+    """Return a frame at xyz, rpy of another: R = Rz(yaw) Ry(pitch) Rx(roll), fixed axes."""
+    xyz, rpy = origin
     (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
     turn = [
         [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
@@ -180,159 +186,130 @@ def _wrong(
     return InputRejected(code, f"URDF: {words}", "urdf_text", remedy)
 
 
-def _xacro() -> InputRejected:
-    words = "this is a xacro macro file, which rrrid does not run"
-    return _wrong(words, "expand it first: xacro arm.urdf.xacro > arm.urdf", "X13")
+def _refuse_xacro(
+    where: object = "urdf_text", kind: type[InputRejected] | type[UsageError] = InputRejected
+) -> NoReturn:
+    words = "URDF: this is a xacro macro file, which rrrid does not run"
+    raise kind("X13", words, where, "expand it first: xacro arm.urdf.xacro > arm.urdf")
 
 
-def _read(path: Path) -> bytes:
-    if path.suffix.lower() == ".xacro":
-        raise _xacro()
-    try:
-        if not path.is_file():  # a pipe or a device would hang
-            words = "not a regular file" if path.exists() else "no such file"
-            raise _wrong(words, "check the path", "C04")
-        with path.open("rb") as file:
-            return file.read(URDF.size + 1)
-    except (OSError, ValueError) as problem:
-        remedy = "check the file and its permissions"
-        raise _wrong(f"cannot be read: {problem}", remedy, "C04") from None
+class _Builder(TreeBuilder):
+    """A tree without document type, whose entities could be followed, and without macros."""
 
+    depth = 0
 
-def _parse(text: bytes | str) -> Element:
-    """Return the XML tree; a document type is refused before an entity could be declared."""
-    if len(text) > URDF.size:
-        raise _wrong(f"larger than {URDF.size // 1_000_000} MB", code="X13")
-    builder, parser, depth, elements = TreeBuilder(), expat.ParserCreate(), 0, 0
-
-    def doctype(*_: object) -> None:
+    def doctype(self, *_: object) -> None:
         words = "has a DOCTYPE or entity declaration, which is never followed"
         raise _wrong(words, "delete the <!DOCTYPE …> from the file", "X13")
 
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal depth, elements
-        depth, elements = depth + 1, elements + 1
-        if tag.startswith("xacro:"):
-            raise _xacro()
-        if depth > URDF.depth or elements > URDF.elements:
-            words = f"more than {URDF.elements} elements, or {URDF.depth} in each other"
-            raise _wrong(words, code="X13")
-        builder.start(tag, attributes)
+    def start(self, tag: str, attrs: dict[str, str], /) -> Element:
+        self.depth += 1
+        if "xacro" in tag:
+            _refuse_xacro()
+        if self.depth > URDF.depth:
+            raise _wrong(f"more than {URDF.depth} elements in each other", code="X13")
+        return super().start(tag, attrs)
 
-    def end(tag: str) -> None:
-        nonlocal depth
-        depth -= 1
-        builder.end(tag)
+    def end(self, tag: str, /) -> Element:
+        self.depth -= 1
+        return super().end(tag)
 
-    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = doctype
-    parser.StartElementHandler, parser.EndElementHandler = start, end
+
+def _tree(text: bytes | str) -> _Tree:
+    """Parse a URDF; every child link has one parent, and there is one root."""
+    if len(text) > URDF.size:
+        raise _wrong(f"larger than {URDF.size // 1_000_000} MB", code="X13")
+    parser = XMLParser(target=_Builder())
     try:
-        parser.Parse(text.lstrip(), True)  # many a file begins with an empty line
-    except (expat.ExpatError, LookupError, ValueError) as problem:
+        parser.feed(text.lstrip())  # many a file begins with an empty line
+        robot: Element = parser.close()
+    except (ParseError, LookupError, ValueError) as problem:
         raise _wrong(f"is not well-formed XML: {problem}") from None
-    return builder.close()
-
-
-def _tree_of(text: bytes | str, where: str) -> _Tree:
-    robot = _parse(text)
-    if robot.tag in _OTHER_FORMATS:
-        remedy = "give the URDF that it was made from, or export a URDF of the arm"
-        raise _wrong(f"this is {_OTHER_FORMATS[robot.tag]}, not a URDF", remedy)
     if robot.tag != "robot":
-        raise _wrong(f"the outermost element is <{robot.tag}>, not <robot>")
-    elements, joints = robot.findall("link"), robot.findall("joint")
-    if max(len(elements), len(joints)) > URDF.links:
-        remedy = "give the URDF of the arm alone"
-        raise _wrong(f"more than {URDF.links} links or joints", remedy, "X13")
-    links: dict[str, Element] = {}
-    for element in elements:
-        if links.setdefault(_name(element), element) is not element:
-            raise _wrong(f"two links are called '{element.get('name')}'")
-    into: dict[str, _Joint] = {}
-    for joint in map(_joint, joints):
+        words = f"the outermost element is <{robot.tag}>, not <robot>"
+        if robot.tag in _OTHER_FORMATS:
+            words = f"this is {_OTHER_FORMATS[robot.tag]}, not a URDF"
+        raise _wrong(words, "export a URDF of the arm, or give the one it was made from")
+    elements, joints = robot.findall("link"), list(map(_joint, robot.findall("joint")))
+    links = {_name(element): element for element in elements}
+    for kind, names in (
+        ("links", [_name(element) for element in elements]),
+        ("joints", [joint.name for joint in joints]),
+    ):
+        if twice := [name for name, count in Counter(names).items() if count > 1]:
+            raise _wrong(f"two {kind} are called '{twice[0]}'")
+    tree = _Tree(_text(robot, "name") or "robot", links, {}, "")
+    for joint in joints:
         for end in (joint.parent, joint.child):
             if end not in links:
                 words = f"joint '{joint.name}' connects link '{end}', which is not defined"
                 raise _wrong(f"{words}{did_you_mean(end, links)}")
-        if any(other.name == joint.name for other in into.values()):
-            raise _wrong(f"two joints are called '{joint.name}'")
-        if joint.child in into:
-            both = f"'{into[joint.child].name}' and '{joint.name}'"
-            words = f"link '{joint.child}' hangs on joints {both}: a closed loop"
-            raise _wrong(words, _SERIAL)
-        into[joint.child] = joint
-    tree = _Tree(_text(robot, "name") or "robot", links, into, _root(links, into), where)
-    if len(tree.below(tree.root)) != len(links):
-        raise _wrong("some joints form a closed loop apart from the root", _SERIAL)
-    return tree
+        if joint.child in tree.into:
+            both = f"'{tree.into[joint.child].name}' and '{joint.name}'"
+            raise _wrong(f"link '{joint.child}' hangs on joints {both}: a closed loop")
+        tree.into[joint.child] = joint
+        tree.out_of.setdefault(joint.parent, []).append(joint)
+    roots = [name for name in links if name not in tree.into]
+    if len(roots) != 1:
+        words = f"links {', '.join(roots)} hang on nothing" if roots else "every link hangs on another"
+        loose = ", ".join(name for name in roots if name not in tree.out_of)
+        remedy = "connect all links into one tree"
+        remedy += f", or delete those without joints: {loose}" if loose else ""
+        raise _wrong(f"there must be one root link, but {words}", remedy)
+    if len(tree.body(roots[0], frozenset())) != len(links):
+        raise _wrong("some joints form a closed loop apart from the root")
+    return _Tree(tree.name, links, tree.into, roots[0], tree.out_of)
 
 
-def _root(links: Iterable[str], into: dict[str, _Joint]) -> str:
-    """Return the only link that hangs on no joint."""
-    roots = [name for name in links if name not in into]
-    if len(roots) == 1:
-        return roots[0]
-    words = f"links {', '.join(roots)} hang on nothing" if roots else "every link hangs on another"
-    loose = ", ".join(n for n in roots if all(joint.parent != n for joint in into.values()))
-    more = f", or delete those without joints: {loose}" if loose else ""
-    remedy = f"connect all links into one tree{more}"
-    raise _wrong(f"there must be one root link, but {words}", remedy)
-
-
-def _way_to_tip(tree: _Tree, tip_link: str | None) -> tuple[list[_Joint], str]:
+def _way_to_tip(
+    tree: _Tree, tip_link: str | None, file: str = "arm.urdf"
+) -> tuple[list[_Joint], str]:
     """Return the joints from the root to the tip, and the tip's name."""
-    tip = tip_link or _only_tip(tree)
+    tip = tip_link or _only_tip(tree, file)
     if tip not in tree.links:
         words = f"there is no link '{tip}' for tip_link{did_you_mean(tip, tree.links)}"
         raise _wrong(words, code="C02")
     way = tree.way(tip)
     for joint in way:
-        if joint.moves and not joint.independent:
+        if not joint.independent:
             what = "a mimic of another" if joint.mimics else joint.type
             words = f"joint '{joint.name}' is {what}, and an arm has independent revolute, "
             words += "continuous and prismatic joints"
-            raise _wrong(words, f'make it type="fixed" in the URDF{_end_there(tree, ", or ")}')
+            remedy = 'make it type="fixed" in the URDF'
+            if any(before.moves for before in tree.way(joint.parent)):
+                remedy += f"; or {_to_end(tree, joint.parent, file)}"
+            raise _wrong(words, remedy)
     if not any(joint.moves for joint in way):
-        remedy = _end_there(tree) or "give the URDF of an arm whose joints move"
-        raise _wrong(f"no joint moves between '{tree.root}' and '{tip}'", remedy)
+        raise _wrong(f"no joint moves between '{tree.root}' and '{tip}'", "give the URDF of an arm")
     return way, tip
 
 
-def _only_tip(tree: _Tree) -> str:
+def _to_end(tree: _Tree, link: str, file: str) -> str:
+    """Return the remedy that ends the arm at `link`, or at the deepest one where none moves it."""
+    if not any(joint.moves for joint in tree.way(link)):
+        ways = {name: tree.way(name) for name in tree.links}
+        serial = [name for name, way in ways.items() if all(joint.independent for joint in way)]
+        link = max(serial, key=lambda name: sum(joint.moves for joint in ways[name]))
+    words = f"say at which link the arm ends, after a colon: {file}:{link}"
+    return f'{words}; in a description or a recipe also tip_link = "{link}"'
+
+
+def _only_tip(tree: _Tree, file: str) -> str:
     """Return the end of the only chain of moving joints; among links fixed to it, the first."""
     link = tree.root
-    while onwards := tree.onwards(link):
+    while True:
+        body = tree.body(link)
+        onwards = [joint for name in body for joint in tree.out_of.get(name, ()) if joint.moves]
+        if not onwards:
+            ends = [name for name in body if name not in tree.out_of]
+            return ends[0] if len(ends) == 1 else link
         if len(onwards) > 1:
-            words = f"joints {', '.join(repr(joint.name) for joint in onwards)} branch off"
-            remedy = _end_there(tree) or 'make those that are no joint of the arm type="fixed"'
-            raise _wrong(f"{words} the same body", remedy)
+            names = ", ".join(f"'{joint.name}'" for joint in onwards)
+            remedy = _to_end(tree, onwards[0].parent, file)
+            raise _wrong(f"joints {names} branch off the same body", remedy)
         link = onwards[0].child
         if not onwards[0].independent:
             return link
-    ends = [n for n in tree.below(link) if all(one.parent != n for one in tree.into.values())]
-    return ends[0] if len(ends) == 1 else link
-
-
-def _end_there(tree: _Tree, before: str = "") -> str:
-    """Return the remedy that names the last link of the arm, as every place takes it.
-
-    An arm may end where its joints end, branch off or cease to be independent: the longest arms
-    first, and before them a body that fingers branch off, not one that arms branch off.
-    """
-    ends: dict[str, int] = {}
-    for link in (tree.root, *(joint.child for joint in tree.into.values() if joint.moves)):
-        way = [joint for joint in tree.way(link) if joint.moves]
-        onwards = tree.onwards(link)
-        goes_on = len(onwards) == 1 and onwards[0].independent
-        if way and all(joint.independent for joint in way) and not goes_on:
-            end = onwards[0].parent if onwards else tree.below(link, fixed=True)[-1]
-            ends[end] = len(way) * (2 if len(onwards) > 1 else 1)
-    if not ends:
-        return ""
-    longest = sorted(ends, key=lambda end: -ends[end])
-    named = ", ".join(f"{tree.where.rpartition('/')[2]}:{end}" for end in longest[:4])
-    remedy = f"{before}say at which link the arm ends, after a colon: {named}"
-    return f'{remedy}; in a description or a recipe also tip_link = "{longest[0]}"'
 
 
 def _joint(element: Element) -> _Joint:
@@ -340,8 +317,7 @@ def _joint(element: Element) -> _Joint:
     kind, place = _text(element, "type"), f"joint '{name}'"
     if kind not in _TYPES:
         raise _wrong(f"{place} has type '{kind}', which must be one of {', '.join(_TYPES)}")
-    parts = [element.find(side) for side in ("parent", "child")]
-    parent, child = (_text(part, "link") for part in parts)
+    parent, child = (_text(element.find(side), "link") for side in ("parent", "child"))
     if not parent or not child:
         raise _wrong(f"{place} lacks its parent or child link")
     axis = _numbers(element.find("axis"), "xyz", "1 0 0", place)
@@ -358,11 +334,12 @@ def _joint(element: Element) -> _Joint:
     if velocity < 0.0 or effort < 0.0 or low > high:
         raise _wrong(f"{place} has a negative velocity or effort limit, or lower above upper")
     return _Joint(
+        element,
         name,
         kind,
         parent,
         child,
-        *_origin(element, place),
+        _origin(element, place),
         axis=axis / (length or 1.0),
         range=(-math.inf, math.inf) if low == high else (low, high),
         velocity=velocity or math.inf,
@@ -375,7 +352,7 @@ def _text(element: Element | None, key: str, default: str = "") -> str:
     """Return an attribute, or its default; a macro in one that nobody reads does no harm (X13)."""
     text = default if element is None else element.get(key, default)
     if "${" in text or "$(" in text:
-        raise _xacro()
+        _refuse_xacro()
     return text
 
 
@@ -398,18 +375,14 @@ def _numbers(
     if len(words) != len(default.split()):
         count = "three numbers" if " " in default else "one number"
         raise _wrong(f"{place}: {key} must hold {count}, not {len(words)}")
-    values = []
-    for word in words:
-        try:
-            values.append(float(word.replace("_", "?")))  # no other reader takes 1_0 for 10
-        except ValueError:
-            raise _wrong(f"{place}: {key} holds '{word}', which is not a number") from None
-        if not abs(values[-1]) <= URDF.number:
-            if bounded or math.isnan(values[-1]):
-                words_ = f"{key} holds {word}, which is not finite or absurdly large"
-                raise _wrong(f"{place}: {words_}")
-            values[-1] = math.copysign(math.inf, values[-1])
-    return np.array(values)
+    try:
+        values = np.array([float(word.replace("_", "?")) for word in words])  # 1_0 is not 10
+    except ValueError:
+        raise _wrong(f"{place}: {key} holds '{' '.join(words)}', which is not a number") from None
+    large = ~(np.abs(values) <= URDF.number)
+    if np.isnan(values).any() or (bounded and large.any()):
+        raise _wrong(f"{place}: {key} holds a number that is not finite or absurdly large")
+    return np.where(large, np.copysign(np.inf, values), values)
 
 
 def _origin(element: Element, place: str) -> tuple[Array, Array]:
@@ -418,23 +391,30 @@ def _origin(element: Element, place: str) -> tuple[Array, Array]:
     return _numbers(origin, "xyz", "0 0 0", place), _numbers(origin, "rpy", "0 0 0", place)
 
 
-def _link(tree: _Tree, first: str, stop: tuple[str, ...]) -> LinkParameters | None:
+def _link(tree: _Tree, first: str, stop: frozenset[str]) -> LinkParameters | None:
     """Return the parameters of a moving body about its joint's frame, all fixed to it included.
 
     I_o = Σ R I_c Rᵀ + m (|c|² 1 - c cᵀ)
     """
     placed = {first: (np.eye(3), np.zeros(3))}
     mass, moment, inertia, known = 0.0, np.zeros(3), np.zeros((3, 3)), False
-    for name in tree.below(first, stop=stop):
+    for name in tree.body(first, stop):
         if name != first:
             joint = tree.into[name]
-            placed[name] = _placed(*placed[joint.parent], joint.xyz, joint.rpy)
-        if (element := tree.links[name].find("inertial")) is not None:
-            m, about_com = _inertial(element, f"link '{name}'")
-            turn, c = _placed(*placed[name], *_origin(element, f"link '{name}'"))
-            parallel = m * (float(c @ c) * np.eye(3) - np.outer(c, c))
-            mass, moment, known = mass + m, moment + m * c, True
-            inertia = inertia + turn @ about_com @ turn.T + parallel
+            placed[name] = _placed(*placed[joint.parent], joint.origin)
+        element, place = tree.links[name].find("inertial"), f"link '{name}'"
+        if element is None:
+            continue
+        m = float(_numbers(element.find("mass"), "value", "0", place)[0])
+        if m < 0.0:
+            raise _wrong(f"{place} has negative mass {m}")
+        keys, own = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), element.find("inertia")
+        xx, yy, zz, xy, xz, yz = (float(_numbers(own, key, "0", place)[0]) for key in keys)
+        about_com = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        turn, c = _placed(*placed[name], _origin(element, place))
+        parallel = m * (float(c @ c) * np.eye(3) - np.outer(c, c))
+        mass, moment, known = mass + m, moment + m * c, True
+        inertia = inertia + turn @ about_com @ turn.T + parallel
     if not known:
         return None
     x, y, z = (moment / mass if mass else np.zeros(3)).tolist()
@@ -444,53 +424,13 @@ def _link(tree: _Tree, first: str, stop: tuple[str, ...]) -> LinkParameters | No
     return LinkParameters(float(mass), (x, y, z), six)
 
 
-def _inertial(element: Element, place: str) -> tuple[float, Array]:
-    """Return the mass, and the inertia (3, 3) about its centre in the axes of <inertial>."""
-    mass = float(_numbers(element.find("mass"), "value", "0", place)[0])
-    if mass < 0.0:
-        raise _wrong(f"{place} has negative mass {mass}")
-    keys, inertia = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), element.find("inertia")
-    xx, yy, zz, xy, xz, yz = (float(_numbers(inertia, key, "0", place)[0]) for key in keys)
-    return mass, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def _impossible_links(tree: _Tree) -> tuple[Check, ...]:
-    """Warn of every link whose inertial parameters no rigid body has (S17)."""
-    found = []
-    for name, link in tree.links.items():
-        element, place = link.find("inertial"), f"link '{name}'"
-        if element is not None and (words := inconsistency(*_inertial(element, place))):
-            words = f"no rigid body has the inertial parameters of {place}: {words}"
-            remedy = "correct them in the URDF: what is known of its links is used"
-            found.append(Check.of("S17", "warn", words, tree.where, remedy))
-    return tuple(found)
-
-
 def _canonical(tree: _Tree, way: list[_Joint]) -> str:
     """Return the shortest URDF with the same chain: link names, joint origins, axes, limits."""
-    from xml.sax.saxutils import quoteattr  # brings urllib and ssl along: 25 ms
-
-    def numbers(vector: Array) -> str:
-        return " ".join(map(repr, vector.tolist()))
-
-    lines = [f"<robot name={quoteattr(tree.name)}>", f"  <link name={quoteattr(tree.root)}/>"]
+    robot = Element("robot", name=tree.name)
+    SubElement(robot, "link", name=tree.root)
     for joint in way:
-        low, high = joint.range
-        limits, kind = {"velocity": joint.velocity, "effort": joint.effort}, joint.type
-        if math.isfinite(low) or math.isfinite(high):  # an end that is left out would be 0
-            limits |= {"lower": max(low, -URDF.no_limit), "upper": min(high, URDF.no_limit)}
-        elif kind == "revolute":
-            kind = "continuous"
-        lines += [
-            f"  <link name={quoteattr(joint.child)}/>",
-            f'  <joint name={quoteattr(joint.name)} type="{kind}">',
-            f'    <origin xyz="{numbers(joint.xyz)}" rpy="{numbers(joint.rpy)}"/>',
-            f"    <parent link={quoteattr(joint.parent)}/>",
-            f"    <child link={quoteattr(joint.child)}/>",
-        ]
-        if joint.moves:
-            lines.append(f'    <axis xyz="{numbers(joint.axis)}"/>')
-            written = [f'{k}="{float(v)!r}"' for k, v in limits.items() if math.isfinite(v)]
-            lines += [f"    <limit {' '.join(written)}/>"] if written else []
-        lines.append("  </joint>")
-    return "\n".join([*lines, "</robot>", ""])
+        SubElement(robot, "link", name=joint.child)
+        own = SubElement(robot, "joint", joint.element.attrib)
+        own.extend(part for part in joint.element if part.tag in _KEPT)
+    indent(robot)
+    return tostring(robot, encoding="unicode")

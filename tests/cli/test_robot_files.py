@@ -37,7 +37,7 @@ def test_a_link_that_cannot_exist_is_named(shared: Path, tmp_path: Path) -> None
     assert len(checks) == 1
     assert checks[0].code == "RRID-S17"
     assert checks[0].level == "warn"
-    assert re.search(r"link 'l\d'.*0\.5", checks[0].message)
+    assert re.search(r"joint 'j\d'.*0\.5", checks[0].message)
     for healthy in ("cases/46-panda-tip-link-remedy/arm.urdf:panda_hand", "real/tx40/tx40.urdf"):
         assert not load_robot(shared / healthy).checks
     path = tmp_path / "robot.toml"
