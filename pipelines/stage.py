@@ -50,7 +50,6 @@ from pipelines.io.sessions import (
     Inputs,
     Rejected,
     Request,
-    check_alike,
     of_one_session,
     read_logs,
     refuse_mixed,
@@ -195,7 +194,6 @@ def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
         refuse_mixed(inputs, filter(os.path.isdir, request.paths))
     if stage.sessions == "one":
         inputs = of_one_session(inputs)
-        inputs = dataclasses.replace(inputs, checks=(*inputs.checks, *check_alike(inputs)))
     try:
         outcome = _outcome(stage, request, settings, inputs, described, started)
     except BaseException as problem:

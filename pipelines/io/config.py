@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import timedelta
 
 
 @dataclass(frozen=True)
@@ -66,16 +65,6 @@ class UrdfConfig:
 
 
 @dataclass(frozen=True)
-class SessionsConfig:
-    """Bounds of a session, and of its list in a message."""
-
-    pause: timedelta = timedelta(hours=3)  # at most, in a session that goes on after midnight
-    longest: timedelta = timedelta(hours=12)  # of such a session
-    named: int = 4  # logs or folders of a session that a message names
-    listed: int = 6  # sessions that a message lists with their logs
-
-
-@dataclass(frozen=True)
 class LimitsConfig:
     """How much may be wrong with the samples of a log."""
 
@@ -100,7 +89,6 @@ class LimitsConfig:
 
 LIMITS = LimitsConfig()
 SANDBOX = SandboxConfig()
-SESSIONS = SessionsConfig()
 TEXT = TextConfig()
 FORMAT = FormatConfig()
 URDF = UrdfConfig()

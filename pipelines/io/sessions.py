@@ -8,16 +8,13 @@ Sessions differ in attributes of their logs (robot, description, day), never in 
 
 from __future__ import annotations
 
-import contextlib
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 from pipelines.errors import Check, InputRejected, RrridError, UsageError, clean, did_you_mean
-from pipelines.io.config import SESSIONS
 from pipelines.io.files import Opened, find_logs, open_log
 from pipelines.io.output import written_by
 from pipelines.io.robot import RobotDescription
@@ -120,28 +117,33 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
     if not request.named:
         raise UsageError("C02", "no logs", "LOGS", "name logs, or folders of logs")
     by_role = _by_role(request.roles)
+    roles: dict[Path, str] = {}
+    for role, given in by_role.items():
+        for file in find_logs(given)[0]:
+            if roles.setdefault(file, role) != role:
+                words = f"{file.name} is named for {roles[file]} and for {role}"
+                raise UsageError("C02", words, f"--{role}", "name it for one of them")
     paths, checks = find_logs(dict.fromkeys(request.named))
     robot = load_robot(request.robot) if request.robot is not None else None
     logs: list[Opened] = []
     rejected: list[Rejected] = []
     for index, path in enumerate(paths, 1):
         request.tell(f"reading {path.name} ({index} of {len(paths)})")
+        options = {"assume_units": request.assume_units, "joints": request.joints}
         try:
-            logs.append(
-                open_log(
-                    path, assume_units=request.assume_units, joints=request.joints, robot=robot
-                )
-            )
-        except RrridError as problem:
-            if problem.exit_code != InputRejected.exit_code:
-                raise
+            opened = open_log(path, **options, robot=robot)
+        except InputRejected as problem:
             rejected.append(Rejected(path, problem))
+            continue
+        if path in roles:
+            opened = replace(opened, log=replace(opened.log, role=roles[path]))
+        if path in roles or opened.log.role not in by_role:
+            logs.append(opened)
     if rejected and not keep_rejected:
         raise _all_of(rejected)
     names = sorted({opened.log.robot_name for opened in logs})
-    roles = _roles_of(by_role)
     inputs = Inputs(
-        tuple(_in_role(logs, roles, by_role)),
+        tuple(logs),
         tuple(rejected),
         (*(robot.checks if robot is not None else ()), *checks),
         paths,
@@ -154,34 +156,14 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
     )
     if not request.session:
         return inputs
-    found = apart(inputs.logs, inputs.named)
-    session = called(request.session, found)
-    if session is None:
-        known = [one.name for one in found]
+    sessions = apart(inputs.logs, inputs.named)
+    of_robot = [one for one in sessions if one.robot == request.session]
+    fitting = [one for one in sessions if one.name == request.session] or of_robot
+    if len(fitting) != 1:
+        known = [one.name for one in sessions]
         words = f"no session '{request.session}'{did_you_mean(request.session, known)}"
         raise UsageError("C01", words, "--session", f"there are: {', '.join(known)}")
-    return only(inputs, session)
-
-
-def _roles_of(by_role: Mapping[str, Sequence[Path]]) -> dict[Path, str]:
-    """Map every file that is named for a role to it."""
-    roles: dict[Path, str] = {}
-    for role, given in by_role.items():
-        for file in find_logs(given)[0]:
-            if roles.setdefault(file, role) != role:
-                words = f"{file.name} is named for {roles[file]} and for {role}"
-                raise UsageError("C02", words, f"--{role}", "name it for one of them")
-    return roles
-
-
-def _in_role(
-    logs: Iterable[Opened], roles: Mapping[Path, str], named: Collection[str]
-) -> Iterable[Opened]:
-    for opened in logs:
-        if opened.path in roles:
-            yield replace(opened, log=replace(opened.log, role=roles[opened.path]))
-        elif opened.log.role not in named:
-            yield opened
+    return only(inputs, fitting[0])
 
 
 def _all_of(rejected: list[Rejected]) -> RrridError:
@@ -226,7 +208,7 @@ def apart(logs: Iterable[Opened], named: Collection[Path] = ()) -> tuple[Session
     Args:
         named: files that the user named for a role: they go with every day of their robot.
     """
-    groups = _grouped(list(logs), named)
+    groups = _grouped(logs, named)
     names = [f"{robot} {day}".strip() for robot, _, day in groups]
     robots = Counter(robot for robot, _, _ in groups)
     found = []
@@ -239,15 +221,8 @@ def apart(logs: Iterable[Opened], named: Collection[Path] = ()) -> tuple[Session
     return tuple(found)
 
 
-def called(wanted: str, found: Collection[Session]) -> Session | None:
-    """Return the session of this name, or the only one of the robot of this name."""
-    of_robot = [one for one in found if one.robot == wanted]
-    fitting = [one for one in found if one.name == wanted] or of_robot
-    return fitting[0] if len(fitting) == 1 else None
-
-
-def _grouped(logs: list[Opened], named: Collection[Path]) -> dict[Key, list[Opened]]:
-    """Return the logs by the robot's name, its description, and the day.
+def _grouped(logs: Iterable[Opened], named: Collection[Path]) -> dict[Key, list[Opened]]:
+    """Return the logs by the robot's name, its description, and the day (UTC).
 
     Reference logs go with every later day, or with the only one; a plan, and what is in `named`,
     with every day of its robot. A day of which all logs judge (role "validate") goes with the day
@@ -256,14 +231,24 @@ def _grouped(logs: list[Opened], named: Collection[Path]) -> dict[Key, list[Open
     """
     groups: dict[Key, list[Opened]] = defaultdict(list)
     others: list[tuple[Key, Opened]] = []
-    for key, opened in _across_midnight(logs):
-        shared = opened.path in named or opened.log.origin == "planned"
-        if shared or opened.log.role == "reference":
+    for opened in logs:
+        log = opened.log
+        key = (log.robot_name, log.robot_text, (log.recorded or "")[:10])
+        if opened.path in named or log.origin == "planned" or log.role == "reference":
             others.append((key, opened))
         else:
             groups[key].append(opened)
-
-    _join_days(groups)
+    for key in [key for key in groups if not key[2]]:
+        days = [day for day in _days(groups, key) if day != key]
+        if len(days) == 1:
+            groups[days[0]] += groups.pop(key)
+    judging = [
+        key for key, own in groups.items() if key[2] and all(o.log.role == "validate" for o in own)
+    ]
+    for key in judging:
+        if days := sorted(day for day in _days(groups, key) if day[2] and day not in judging):
+            before = [day for day in days if day < key]
+            groups[before[-1] if before else days[0]] += groups.pop(key)
     if not groups:  # what the user named alone is one session
         for key, opened in others:
             if opened.path in named:
@@ -283,46 +268,6 @@ def _grouped(logs: list[Opened], named: Collection[Path]) -> dict[Key, list[Open
 def _days(groups: Iterable[Key], key: Key) -> list[Key]:
     """Return the groups of the same robot as `key`."""
     return [one for one in groups if one[:2] == key[:2]]
-
-
-def _join_days(groups: dict[Key, list[Opened]]) -> None:
-    """Join logs without a date, and days of which all logs judge, with the day they belong to."""
-    for key in [key for key in groups if not key[2]]:
-        days = [day for day in _days(groups, key) if day != key]
-        if len(days) == 1:
-            groups[days[0]] += groups.pop(key)
-    judging = [
-        key for key, own in groups.items() if key[2] and all(o.log.role == "validate" for o in own)
-    ]
-    for key in judging:
-        if days := sorted(day for day in _days(groups, key) if day[2] and day not in judging):
-            before = [day for day in days if day < key]
-            groups[before[-1] if before else days[0]] += groups.pop(key)
-
-
-def _across_midnight(logs: list[Opened]) -> list[tuple[Key, Opened]]:
-    """Return the logs with their keys, those after midnight (UTC) with the day before.
-
-    It is one session where no pause is longer than three hours, and all of it twelve. Reference
-    logs and hours that are not given decide nothing.
-    """
-    keys = [(o.log.robot_name, o.log.robot_text, (o.log.recorded or "")[:10]) for o in logs]
-    times: dict[Key, list[datetime]] = defaultdict(list)
-    for key, opened in zip(keys, logs, strict=True):
-        recorded = opened.log.recorded or ""
-        if "T" in recorded and opened.log.role != "reference":
-            with contextlib.suppress(ValueError):  # 30 February
-                began = datetime.fromisoformat(recorded)
-                times[key].append(began.replace(tzinfo=began.tzinfo or UTC))
-    same: dict[Key, Key] = {}
-    for key, after in sorted(times.items()):
-        before = (*key[:2], (min(after) - timedelta(days=1)).date().isoformat())
-        if before not in times or before in same:
-            continue
-        pause, whole = min(after) - max(times[before]), max(after) - min(times[before])
-        if pause <= SESSIONS.pause and whole <= SESSIONS.longest:
-            same[key] = before
-    return [(same.get(key, key), opened) for key, opened in zip(keys, logs, strict=True)]
 
 
 def of_one_session(inputs: Inputs) -> Inputs:
@@ -347,12 +292,9 @@ def of_one_session(inputs: Inputs) -> Inputs:
     robots = len({(session.robot, session.description) for session in several})
     days = len(several) > robots
     kinds = " and ".join(kind for kind, there in (("robots", robots > 1), ("days", days)) if there)
-    words = f"logs of several {kinds}: {_listed(several)}"
+    words = f"logs of several {kinds}: {'; '.join(map(_in_words, several))}"
     if robots > 1 and inputs.named:
-        remedy = (
-            "name logs of one robot alone for --identify, --validate and --reference; if it is one "
-            "robot, described twice, give --robot FILE"
-        )
+        remedy = "name logs of one robot alone; if it is one, described twice, give --robot FILE"
         raise UsageError("C02", words, inputs.label, remedy)
     remedy = f"take one with --session '{several[0].name}', or all with "
     remedy += "'rrrid batch FOLDER [--stage COMMAND]'"
@@ -375,56 +317,11 @@ def refuse_mixed(inputs: Inputs, folders: Iterable[Path]) -> None:
         of_one_session(replace(inputs, logs=logs, label=str(folder)))
 
 
-def _listed(sessions: list[Session]) -> str:
-    """Name the sessions, and of a few the logs of each: by a folder that holds no others."""
-    names = [clean(session.name, 60) for session in sessions]
-    if len(sessions) > SESSIONS.listed:
-        return "; ".join(names)
-    logs = [[o.path for o in one.logs if o.log.origin != "planned"] for one in sessions]
-    homes = [sorted({path.parent for path in own}) for own in logs]
-    shared = Counter(folder for own in homes for folder in own)
-    parts = []
-    for name, own, folders in zip(names, logs, homes, strict=True):
-        there = _first_of([path.name for path in own])
-        if len(folders) < SESSIONS.named and all(shared[folder] == 1 for folder in folders):
-            there = f"{len(own)} log{'s' if len(own) > 1 else ''} in "
-            there += _first_of([folder.name for folder in folders])
-        parts.append(f"{name} ({there})")
-    return "; ".join(parts)
+def _in_words(session: Session) -> str:
+    files = [opened.path.name for opened in session.logs if opened.log.origin != "planned"]
+    return f"{clean(session.name, 60)} ({_first_of(files)})"
 
 
-def _first_of(names: Sequence[str]) -> str:
-    first = ", ".join(clean(name, 40) for name in names[: SESSIONS.named])
-    rest = len(names) - SESSIONS.named
-    return f"{first} and {rest} more" if rest > 0 else first
-
-
-def check_alike(inputs: Inputs) -> tuple[Check, ...]:
-    """Warn of logs of one name in two folders, and of a day that judges another (S21).
-
-    Where neither robot nor day distinguishes them, they may well be of two machines.
-    """
-    found = []
-    for session in apart(inputs.logs, inputs.named):
-        logs = [o for o in session.logs if o.path not in inputs.named]
-        homes: dict[tuple[str, str], dict[Path, str]] = defaultdict(dict)
-        for opened in logs:
-            if opened.log.origin != "planned":
-                homes[opened.log.name, opened.log.role][opened.path.parent] = opened.sha256
-        doubled = [own for own in homes.values() if len(set(own.values())) > 1]
-        if folders := dict.fromkeys(folder.name for own in doubled for folder in own):
-            words = f"the folders {_first_of(list(folders))} hold logs of the same names, robot "
-            words += "and day, and were taken for one session"
-            remedy = (
-                "if they are of two machines or sessions, give each folder by itself, or let "
-                "their logs say so: robot_name, recorded"
-            )
-            found.append(Check.of("S21", "warn", words, clean(session.name, 60), remedy))
-        days = [(o.log.role == "validate", (o.log.recorded or "")[:10]) for o in logs]
-        fitted = {day for judges, day in days if day and not judges}
-        alone = {day for judges, day in days if day and judges} - fitted
-        if fitted and alone:
-            words = f"its logs of {max(alone)}, which all judge, were taken with it"
-            remedy = "if that is another session, name its logs by --validate"
-            found.append(Check.of("S21", "warn", words, clean(session.name, 60), remedy))
-    return tuple(found)
+def _first_of(names: Sequence[str], most: int = 4) -> str:
+    first = ", ".join(clean(name, 40) for name in names[:most])
+    return f"{first} and {len(names) - most} more" if len(names) > most else first
