@@ -65,8 +65,6 @@ FAULTS = (
     Fault("S08 ns", lambda g: retimed(g, lambda t: t * 1000000000.0), "repair", "is in ns", "signal t"),
     Fault("S08 index", lambda g: replace(retimed(g, lambda t: np.arange(t.size) * 1.0), sample_time=0.0008),
           "repair", "sample numbers", "signal t", also=("RRID-D12",)),
-    Fault("S08 slow", lambda g: replace(retimed(g, lambda t: t * 1000.0), sample_time=1000.0 * g.sample_time),
-          "warn", "with steps in ms, joint", "signal t", False, also=("RRID-D09", "RRID-S14", "RRID-S15")),
     Fault("S08 neither", lambda g: retimed(g, lambda t: t * 2.5), "reject", "no unit of time", "signal t"),
     Fault("S09", lambda g: replace(g, sample_time=1000.0), "reject", "holds the rate", "signal t"),
     Fault("S13 tau", lambda g: with_signal(g, tau=g.tau[:, [0, 2, 1]]),

@@ -36,8 +36,7 @@ def length(s: Subject) -> list[Check]:
 def unit_of_time(s: Subject) -> list[Check]:
     """S08, S09: the steps of t and the declared sample time are alike, in one unit."""
     time, nominal = s.good.time, s.log.sample_time
-    tick = time.median / time.scale
-    steps = f"sample_time is {nominal:.6g}, and t steps by {tick:.6g}"
+    steps = f"sample_time is {nominal:.6g}, and t steps by {time.median / time.scale:.6g}"
     if time.is_rate:
         words = f"{steps}: it holds the rate in Hz"
         return [s.say("S09", "reject", words, f"write sample_time = {1 / nominal:.6g}", signal="t")]
@@ -88,16 +87,15 @@ def repeated_stamps(s: Subject) -> list[Check]:
 
 
 def _stale(s: Subject) -> str:
-    """Say how many whole rows are repeated under a new stamp; empty where none is.
+    """Return how many whole rows are repeated under a new stamp, in words; "" for none.
 
     Channels repeat values each at its own time, but for a row that is stale: where the channel that
-    changes most often repeats, all others do, and where it changes they do not. What repeats for
-    longer is an arm at rest.
+    changes most often repeats, all others do, and where it changes they do not.
     """
     rows = np.hstack([s.log.q, s.log.tau])
     same = rows[1:] == rows[:-1]
     moves = np.ones(len(same), dtype=bool)
-    for first, last in long_blocks(same.all(axis=1)):
+    for first, last in long_blocks(same.all(axis=1)):  # an arm at rest
         moves[first:last] = False
     same = same[moves]
     finest = int(np.argmin(same.sum(axis=0)))
@@ -106,12 +104,12 @@ def _stale(s: Subject) -> str:
         return ""
     if min(others[old].mean(), 1.0 - others[~old].mean()) < CONFIG.stale_together:
         return ""
-    share, rate = float(old.mean()), 1.0 / s.log.sample_time
-    every = round(1.0 / (1.0 - share))
-    even = np.mean(np.diff(np.flatnonzero(~old)) == every) >= 1.0 - CONFIG.stale_share
+    share = float(old.mean())
+    steps = np.diff(np.flatnonzero(~old))
+    even = np.mean(steps == 2) >= 1.0 - CONFIG.stale_share  # noqa: PLR2004
     words = f"{percent(share, 2)} of the samples repeat the one before under a new stamp"
-    known = {2: "every second sample repeats the one before"} if even else {}
-    return f"{known.get(every, words)}: {rate * (1.0 - share):.3g} Hz"
+    words = "every second sample repeats the one before" if even else words
+    return f"{words}: {(1.0 - share) / s.log.sample_time:.3g} Hz"
 
 
 def lost_samples(s: Subject) -> list[Check]:
@@ -136,8 +134,8 @@ def gaps(s: Subject) -> list[Check]:
     words = f"{lost}; the longest of {many(len(runs), 'usable part')} has {longest} samples"
     if not runs:
         words = f"{lost}; no stretch between them has {SHORTEST} samples"
-    remedy = "record again without interruption"
     level: Level = "repair" if runs else "reject"
+    remedy = "record again without interruption"
     return [s.say("T04", level, words, remedy, signal="t", sample=int(at[0]))]
 
 
@@ -147,8 +145,8 @@ def jitter(s: Subject) -> list[Check]:
     words = f"the interval varies: rms {rms}, at most {worst} of the sample time"
     if s.good.time.jitter <= limits.LARGEST_JITTER:
         return s.ok("T05", words, signal="t")
-    remedy = "sample by a timer; a frequency response needs even sampling"
     words += f"; more than {percent(limits.LARGEST_JITTER)} rms"
+    remedy = "sample by a timer; a frequency response needs even sampling"
     return [s.say("T05", "warn", words, remedy, signal="t")]
 
 

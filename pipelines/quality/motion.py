@@ -180,44 +180,32 @@ def _elsewhere(
 ) -> Check:
     """Return why joint `j` is not at its reference."""
     away, scale, rest = fits[j, j]
+    if float(np.mean(s.good.saturated[: s.good.end, j])) > CONFIG.at_top:
+        words = f"position and reference differ by {percent(away, 2)} of the motion: "
+        words += "the torque is at its limit, and the joint cannot follow"
+        remedy = "look for what limits the drive, or drive it more gently"
+        return s.say("S16", "warn", words, remedy, True, signal="q_ref", joint=j)
+    level: Level = "reject" if away > CONFIG.away else "warn"
     in_scale = rest < CONFIG.proportional and abs(scale) > CONFIG.moves
     near, k = min(((fits[j, k][0], k) for i, k in fits if i == j != k), default=(np.inf, j))
     # where joint k follows its own reference, that of joint j is only like it
-    mixed = near <= CONFIG.others and not (in_scale and fits[k, k][0] <= CONFIG.others)
-    # The limit at which a torque is for a good part of the time; a wave is longer near its crest
-    # than on it.
-    size = np.abs(s.good.log.tau[: s.good.end, j])
-    size = size[np.isfinite(size) & (size > 0.0).any()]
-    top = float(size.max(initial=0.0))
-    there = float(np.mean(size >= CONFIG.at_limit * top)) if size.size else 0.0
-    crest = float(np.mean(size >= 0.9 * top)) - there if size.size else 0.0
-    limited = there > max(CONFIG.at_top, crest)
-    level: Level = "reject" if away > CONFIG.away and not limited else "warn"
-    if mixed and not limited:
+    if near <= CONFIG.others and not (in_scale and fits[k, k][0] <= CONFIG.others):
         words = f"position of joint {j + 1} follows the reference of joint {k + 1}, within "
         words += f"{percent(near, 2)} of it, and not its own: their columns are mixed up"
-        remedy = f"in the map of the import, take the position of joint {k + 1} from where that of "
-        remedy += f"joint {j + 1} comes from, or reorder the references; look at torques as well"
+        remedy = "correct the map of the import, of positions, references or torques"
         return s.say("S13", level, words, remedy, True, signal="q", joint=j)
-    if in_scale and not limited:
+    if in_scale:
         words = f"position of joint {j + 1} is {scale:.3g} times its reference, within "
         words += f"{percent(rest, 2)} of it"
         remedy = "correct the gear ratio, the direction or the counts per turn of this encoder; if "
         remedy += "the position is right, the scale of the reference"
-        for large, small, times in (("q", "q_ref", scale), ("q_ref", "q", 1.0 / scale)):
-            degrees = abs(np.deg2rad(times) - 1.0) < CONFIG.proportional
-            if s.log.robot.joints[j].revolute and degrees:
+        for large, times in (("q", scale), ("q_ref", 1.0 / scale)):
+            if abs(np.deg2rad(times) - 1.0) < CONFIG.proportional:
                 words += f": {large} looks like degrees, declared in rad"
-                remedy = f'declare the unit "deg" of {large}; or, if {small} was converted to rad '
-                remedy += "twice, undo that"
         return s.say("S15", level, words, remedy, True, signal="q", joint=j)
     words = f"position and reference differ by {percent(away, 2)} of the motion: "
-    if limited:
-        words += f"the torque is at ±{top:.3g} {s.unit('tau', j)}, and the joint cannot follow"
-        remedy = "look for what limits the drive, or drive it more gently"
-    else:
-        words += "they are not of the same run, or not of the same joint"
-        remedy = "log both in one recorder, or leave the reference out"
+    words += "they are not of the same run, or not of the same joint"
+    remedy = "log both in one recorder, or leave the reference out"
     return s.say("S16", level, words, remedy, True, signal="q_ref", joint=j)
 
 

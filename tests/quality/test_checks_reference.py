@@ -44,6 +44,5 @@ def test_a_reference_in_the_other_unit_of_angle_is_no_other_gear(scale: float, l
     said = said_of(with_signal(log, q_ref=log.q / (lag * scale)))
     assert {c.code for c in said} == {"RRID-S15"}
     assert len(said) == log.n_joints
-    large, small = ("q_ref", "q") if scale < 1.0 else ("q", "q_ref")
-    assert all(c.message.endswith(f"{large} looks like degrees, declared in rad") and f'"deg" of {large}' in c.remedy and
-               f"if {small} was converted to rad twice" in c.remedy for c in said)
+    large = "q_ref" if scale < 1.0 else "q"
+    assert all(c.message.endswith(f"{large} looks like degrees, declared in rad") for c in said)
