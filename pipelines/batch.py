@@ -75,29 +75,23 @@ def module_of(stage: str) -> str:
     return f"pipelines.{stage.replace('-', '_')}"
 
 
-def find_items(root: Path, each_log: bool = False) -> tuple[tuple[Item, ...], tuple[Check, ...]]:
-    """Return the items below `root`, sorted by name, and what was passed over.
-
-    Every folder that holds logs is an item; what is a log, `find_logs` says. So is a folder that
-    cannot be listed: it fails alone.
-
-    Args:
-        each_log: every log is an item.
+def find_items(root: Path) -> tuple[tuple[Item, ...], tuple[Check, ...]]:
+    """Return every folder of logs below `root`, sorted by name, and what was passed over.
 
     Raises:
         UsageError: C04, `root` does not exist; C02, it is no folder.
         NothingMatched: C06, there is no log below it.
+        EnvironmentFault: F13, a folder cannot be listed.
     """
     root = root.absolute()
     if not os.path.isdir(root):
         regular_file(root)
         words = "is a log, not a folder of folders"
         raise UsageError("C02", words, root, "run the stage on it alone")
-    unreadable: list[Path] = []
-    logs, checks = find_logs([root], unreadable)
-    folders: dict[Path, list[Path]] = {folder: [] for folder in unreadable}
+    logs, checks = find_logs([root])
+    folders: dict[Path, list[Path]] = {}
     for log in logs:
-        folders.setdefault(log if each_log else log.parent, []).append(log)
+        folders.setdefault(log.parent, []).append(log)
     items = []
     for folder, own in folders.items():
         nested = any(other.is_relative_to(folder) for other in folders if other != folder)
@@ -116,7 +110,7 @@ def run_batch(plan: Plan, tell: Callable[[str], None] = lambda words: None) -> O
             P04, no worker.
     """
     wanted, plan = plan.out, replace(plan, root=plan.root.absolute(), out=plan.out.absolute())
-    items, checks = find_items(plan.root, plan.each_log)
+    items, checks = find_items(plan.root)
     refuse_place(plan.out, (), (plan.root,), inside=True)
     claim(plan.out, plan.stage, plan.request.force)
     number, of = plan.shard
@@ -186,7 +180,6 @@ class _Batch:
         self.kept = 0
         self.notices: list[Check] = []
         self.fault: EnvironmentFault | None = None  # no output can be written, or no worker is left
-        self.aborted = False
         self.ledger = self.out / "ledger" / "{}-of-{}.jsonl".format(*plan.shard)
         if _stage_of(self.out) != plan.stage:  # replaced, as --force says
             for folder in ("items", "crashes"):
@@ -204,7 +197,7 @@ class _Batch:
                     path.unlink()
 
     def stopped(self) -> bool:
-        return bool(self.heard) or self.fault is not None or self.aborted
+        return bool(self.heard) or self.fault is not None
 
     def go(self, items: Iterable[Item], tell: Callable[[str], None]) -> None:
         """Do what is not done yet, until all is done or something stops it."""
@@ -213,21 +206,15 @@ class _Batch:
         if self.kept:
             tell(f"{self.kept} of {total} are done already")
         try:
-            with contextlib.closing(run_items(self.plan, waiting, self.stopped)) as results:
-                for item, record in results:
-                    try:
-                        self._take(item, record)
-                    except EnvironmentFault as problem:  # no room: what is done is done
-                        self.fault = problem
-                    if sessions := self.divided.get(item.slug):
-                        waiting += [one for one in sessions if not self._keep(one)]
-                        total += len(sessions) - 1
-                    elif item.slug in self.records:
-                        done = record.item
-                        tell(f"{len(self.records)} of {total}: {done.name} {done.status}")
-                    if self.stopped():
-                        break
-        except EnvironmentFault as problem:  # no workers, or none any more
+            for item, record in run_items(self.plan, waiting, self.stopped):
+                self._take(item, record)
+                if sessions := self.divided.get(item.slug):
+                    waiting += [one for one in sessions if not self._keep(one)]
+                    total += len(sessions) - 1
+                elif item.slug in self.records:
+                    done = record.item
+                    tell(f"{len(self.records)} of {total}: {done.name} {done.status}")
+        except EnvironmentFault as problem:  # no room, or no workers: what is done is done
             self.fault = problem
 
     def _keep(self, item: Item) -> bool:
@@ -274,7 +261,6 @@ class _Batch:
             ]
             return
         self.records[item.slug] = record
-        self.aborted = self.plan.abort and record.item.status in ("rejected", "failed")
 
     def _discard(self, slug: str) -> None:
         """Remove an item's result, in one step."""

@@ -18,7 +18,7 @@ import threading
 import time
 import traceback
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field, replace
@@ -42,9 +42,8 @@ from pipelines.report.batch_report import DoneItem, Problem, Status
 from pipelines.report.result_figures import fitted, residuals
 from pipelines.stage import Outcome, Request, Stage, run_stage
 
-__all__ = ["Item", "Plan", "Record", "Status", "failed", "load_stage", "relative", "run_items"]
-
 _ALONE = "run the stage on it alone"
+_LEFT = 256  # numerics: an exit code that no process has, instead of 0
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -61,8 +60,6 @@ class Plan:
     memory: int | None = None  # [B] that an item may use beyond what its process has at the start
     timeout: float | None = None  # [s] for one item
     backend: str = "local"  # or dask://HOST:PORT
-    each_log: bool = False  # each log is an item
-    abort: bool = False  # stop at the first item that is rejected or fails
     resume: bool = False
     shard: tuple[int, int] = (1, 1)  # I, N: every Nth item from the Ith on
     folder: str = field(default_factory=os.getcwd)  # where relative paths of the settings begin
@@ -74,7 +71,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Item:
-    """One folder of logs, one session of it, or one log."""
+    """One folder of logs, or one session of it."""
 
     name: str  # its path relative to the root, "." for the root itself; with the session
     paths: tuple[Path, ...]  # what the stage is given
@@ -110,7 +107,7 @@ class Workers:
     """The processes of this machine, or of a cluster."""
 
     submit: Callable[[Item], Future[Record]]
-    ahead: int  # items to keep in hand
+    ahead: int  # items to keep in hand: the next one is there when a worker is done
     alive: Callable[[], bool]
     gone: Exception  # where they are not
 
@@ -148,21 +145,27 @@ def _record(plan: Plan, item: Item, outcome: Outcome[Any]) -> Record:
         error = Problem(**rejected[0].as_error().as_dict())
     inputs = outcome.inputs
     own = [opened.log.recorded for opened in inputs.logs if opened.log.role != "reference"]
-    recorded = min(filter(None, own), default=None)
-    verdict, folder = clean(outcome.report.verdict, None), f"items/{item.slug}"
-    name, code, robot = clean(item.name), outcome.exit_code, inputs.robot_name
+    done = DoneItem(
+        clean(item.name),
+        status,
+        error,
+        clean(outcome.report.verdict, None),
+        outcome.exit_code,
+        inputs.robot_name,
+        min(filter(None, own), default=None),
+        f"items/{item.slug}",
+    )
     turning = inputs.logs[0].log.robot.revolute if inputs.logs else ()
-    hashes = {
-        relative(path, plan): inputs.hashes.get(path) or hash_file(path)
-        for path in inputs.sources
-        if path.is_file()
-    }
     return Record(
-        DoneItem(name, status, error, verdict, code, robot, recorded, folder),
+        done,
         item.slug,
         figures=fitted(outcome.json),
         residuals=residuals(outcome.json, turning),
-        inputs=hashes,
+        inputs={
+            relative(path, plan): inputs.hashes.get(path) or hash_file(path)
+            for path in inputs.sources
+            if path.is_file()
+        },
         logs=tuple(relative(log, plan) for log in item.logs),
         provenance=hash_file(outcome.folder / PROVENANCE),
     )
@@ -188,7 +191,7 @@ def failed(plan: Plan, item: Item, problem: BaseException) -> Record:
 
 def run_items(
     plan: Plan, waiting: deque[Item], stopped: Callable[[], bool], restarts: int = 3
-) -> Generator[tuple[Item, Record], None, None]:
+) -> Iterator[tuple[Item, Record]]:
     """Yield each item of `waiting` with its record as it is done, until `stopped()`.
 
     Items that the caller appends meanwhile are run as well. A worker that dies without an item
@@ -207,12 +210,23 @@ def run_items(
     broken = 0
     while waiting and not stopped():
         running: dict[Future[Record], Item] = {}
-        most = sum(len(item.logs) for item in waiting)  # as many as there are sessions, at most
         try:
-            with pool(plan, max(1, min(plan.jobs, most))) as workers:
-                for item, problem, record in _results(workers, waiting, running, stopped):
-                    broken = 0
-                    yield item, record or failed(plan, item, _fault(problem, plan))
+            with pool(plan) as workers:
+                while (waiting or running) and not stopped():
+                    while waiting and len(running) < workers.ahead:
+                        future = workers.submit(waiting[0])
+                        running[future] = waiting.popleft()
+                    if not workers.alive():
+                        raise workers.gone
+                    for future in wait(running, timeout=0.1, return_when=FIRST_COMPLETED).done:
+                        problem = workers.gone if future.cancelled() else future.exception()
+                        if stopped():  # the signal went to the workers too: no item ended them
+                            return
+                        if problem is workers.gone or isinstance(problem, BrokenProcessPool):
+                            raise problem
+                        broken, item = 0, running.pop(future)
+                        fault = None if problem is None else _fault(problem, plan)
+                        yield item, failed(plan, item, fault) if fault else future.result()
         except BrokenProcessPool:
             waiting.extendleft(reversed(running.values()))
             broken += 1
@@ -222,39 +236,7 @@ def run_items(
                 raise EnvironmentFault("P04", words, "batch", remedy) from None
 
 
-def _results(
-    workers: Workers,
-    waiting: deque[Item],
-    running: dict[Future[Record], Item],
-    stopped: Callable[[], bool],
-    seconds: float = 0.1,
-) -> Iterator[tuple[Item, BaseException | None, Record | None]]:
-    """Keep some items in hand: the next one is there when a worker is done with its last.
-
-    Args:
-        seconds: [s] between two looks whether to stop.
-
-    Raises:
-        BrokenProcessPool: what is `running` was not done.
-    """
-    while (waiting or running) and not stopped():
-        while waiting and len(running) < workers.ahead:
-            future = workers.submit(waiting[0])
-            running[future] = waiting.popleft()
-        if not workers.alive():
-            raise workers.gone
-        for future in wait(running, timeout=seconds, return_when=FIRST_COMPLETED).done:
-            if future.cancelled():
-                raise workers.gone
-            problem = future.exception()
-            if stopped():  # the signal went to the workers as well: no item ended them
-                return
-            if isinstance(problem, BrokenProcessPool):
-                raise problem
-            yield running.pop(future), problem, None if problem else future.result()
-
-
-def _fault(problem: Any, plan: Plan) -> Any:
+def _fault(problem: Any, plan: Plan) -> BaseException:
     """Return the fault behind an exception of pebble or Dask (P04, P05)."""
     kind = type(problem).__name__
     if isinstance(problem, TimeoutError) and plan.timeout is not None:
@@ -264,12 +246,13 @@ def _fault(problem: Any, plan: Plan) -> Any:
         return _crashed(problem.exitcode)
     if kind == "KilledWorker":
         return EnvironmentFault("P04", "crashed: every worker that had it died", remedy=_ALONE)
-    return problem
+    found: BaseException = problem
+    return found
 
 
 def _crashed(exit_code: int) -> EnvironmentFault:
     """P04, of a process that ended with `exit_code`, negative for a signal."""
-    words, remedy = f"crashed: its process ended with {exit_code % _Worker.LEFT}", _ALONE
+    words, remedy = f"crashed: its process ended with {exit_code % _LEFT}", _ALONE
     if exit_code < 0:
         words = f"crashed signal {-exit_code} ({signal.Signals(-exit_code).name})"
     if exit_code == -signal.SIGKILL:
@@ -280,12 +263,10 @@ def _crashed(exit_code: int) -> EnvironmentFault:
 class _Worker(SpawnProcess):
     """A worker of pebble; one that ends with 0 would count as one that pebble has stopped."""
 
-    LEFT = 256  # instead of 0
-
     @property
     def exitcode(self) -> int | None:
         code = super().exitcode
-        return self.LEFT if code == 0 else code
+        return _LEFT if code == 0 else code
 
 
 class _Context(SpawnContext):
@@ -293,11 +274,11 @@ class _Context(SpawnContext):
 
 
 @contextlib.contextmanager
-def _local(plan: Plan, jobs: int) -> Iterator[Workers]:
+def _local(plan: Plan) -> Iterator[Workers]:
     """Let processes of this machine do the items."""
     from pebble import ProcessPool
 
-    pool: Any = ProcessPool(jobs, initializer=_begin, initargs=(plan,), context=_Context())
+    pool: Any = ProcessPool(plan.jobs, initializer=_begin, initargs=(plan,), context=_Context())
 
     def submit(item: Item) -> Future[Record]:
         before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)  # workers do not hear Ctrl-C
@@ -314,7 +295,7 @@ def _local(plan: Plan, jobs: int) -> Iterator[Workers]:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     try:
-        yield Workers(submit, 2 * jobs, lambda: bool(pool.active), BrokenProcessPool())
+        yield Workers(submit, 2 * plan.jobs, lambda: bool(pool.active), BrokenProcessPool())
     finally:
         pool.stop()
         pool.join()
@@ -344,9 +325,8 @@ def _end_with_parent(parent: int, seconds: float = 0.2) -> None:
 
 
 @contextlib.contextmanager
-def _cluster(plan: Plan, jobs: int, seconds: float = 10.0) -> Iterator[Workers]:
+def _cluster(plan: Plan) -> Iterator[Workers]:
     """Let a Dask cluster do the items; those of a worker that dies are done by the others."""
-    del jobs  # the scheduler has its own workers
     scheme, _, place = plan.backend.partition("://")
     if scheme != "dask" or not place:
         words = f"'{plan.backend}' is no cluster"
@@ -358,18 +338,19 @@ def _cluster(plan: Plan, jobs: int, seconds: float = 10.0) -> Iterator[Workers]:
         raise UsageError("C02", words, where="--backend", remedy=remedy) from None
     try:
         connect: Any = distributed.Client
-        client = connect(f"tcp://{place}", timeout=seconds, set_as_default=False)
+        client = connect(f"tcp://{place}", timeout=10.0, set_as_default=False)
     except (OSError, ValueError) as problem:
         words, remedy = f"the scheduler cannot be reached: {problem}", "start it: dask scheduler"
         raise EnvironmentFault("P04", words, where=plan.backend, remedy=remedy) from None
     executor = client.get_executor(pure=False)
     words, remedy = "the scheduler went away", "start it again, and go on with --resume"
+    gone = EnvironmentFault("P04", words, "--backend", remedy)
     try:
         yield Workers(
             lambda item: executor.submit(in_child, plan, item),
             ahead=sys.maxsize,
             alive=lambda: bool(client.status == "running"),
-            gone=EnvironmentFault("P04", words, "--backend", remedy),
+            gone=gone,
         )
     finally:
         if client.status == "running":

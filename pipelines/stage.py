@@ -46,14 +46,7 @@ from pipelines.io.output import (
 )
 from pipelines.io.results import encode, headed, json_text
 from pipelines.io.robot_files import robot_sources
-from pipelines.io.sessions import (
-    Inputs,
-    Rejected,
-    Request,
-    of_one_session,
-    read_logs,
-    refuse_mixed,
-)
+from pipelines.io.sessions import Inputs, Rejected, Request, of_one_session, read_logs, refuse_mixed
 from pipelines.report.config import REPORT
 from pipelines.report.report import Report
 

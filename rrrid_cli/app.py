@@ -81,25 +81,18 @@ class Batch:
 
     root: Path = option(Path(), "Folder with many folders of logs.", "ROOT")
     stage: str = option("run", "Command to run on each: run, estimate-bps, inspect, …")
-    each_log: bool = option(False, "On each log, not on each folder that holds logs.")
     jobs: int | None = option(None, "Items at a time. [as many as there are cores]")
     timeout: float | None = option(None, "Time for one item [s]; then it has failed. [none]")
     memory: str | None = option(None, "Memory for one item: 500M, 2G; then it has failed. [none]")
-    on_error: str = option("continue", "continue or abort, where an item is rejected or fails.")
     resume: bool = option(False, "Do only what is unfinished, failed, rejected or changed.")
     shard: str | None = option(None, "I/N: every Nth item alone, from the Ith on. [all]")
     backend: str = option("local", "local, or dask://HOST:PORT: a Dask scheduler.")
     joints: tuple[int, ...] = option((), "Joints to take of every log: 1,3. --robot is theirs.")
 
     def __post_init__(self) -> None:
-        ways, jobs, timeout = ("continue", "abort"), self.jobs, self.timeout
-        for flag, value, possible, remedy in (
-            ("--jobs", jobs, jobs is None or jobs > 0, "give 1 or more"),
-            ("--timeout", timeout, timeout is None or timeout > 0.0, "give seconds"),
-            ("--on-error", self.on_error, self.on_error in ways, " or ".join(ways)),
-        ):
-            if not possible:
-                raise UsageError("C02", f"'{value}' is not possible", flag, remedy)
+        for flag, value in (("--jobs", self.jobs), ("--timeout", self.timeout)):
+            if value is not None and not value > 0:
+                raise UsageError("C02", f"'{value}' is not possible", flag, "give more than 0")
 
 
 def build(word: str) -> typer.Typer:
@@ -316,7 +309,6 @@ def _batch(name: str, given: Mapping[str, Any]) -> int:
         "out": common.out or Path("runs/several") / slug(own.root.resolve().name) / "batch",
         "jobs": own.jobs or processors(),
         "memory": _bytes(own.memory),
-        "abort": own.on_error == "abort",
         "shard": read_shard(own.shard),
     }
     with (progress := console.Progress(common)):

@@ -334,92 +334,72 @@ def expanded(inputs: Iterable[Path]) -> tuple[Path, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def find_logs(
-    inputs: Iterable[Path], unreadable: list[Path] | None = None
-) -> tuple[tuple[Path, ...], tuple[Check, ...]]:
+def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ...]]:
     """Return the logs named by `inputs`: files as they are, folders searched below.
 
     Hidden files, and folders that rrrid itself wrote, are passed over, unless such a folder is
     named: then its logs are meant. A link to a log is that log; links to folders, and those that
     lead nowhere, are passed over with a warning.
 
-    Args:
-        unreadable: takes the folders that cannot be listed; None: the first one is an error.
-
     Raises:
         UsageError: an input does not exist.
         EnvironmentFault: F13, a folder cannot be listed.
         NothingMatched: there is no log at all.
     """
-    search = _Search(unreadable)
-    inputs = tuple(inputs)
+    inputs, found = tuple(inputs), _Found([], [], [], [])
     for path in inputs:
         if not os.path.isdir(path):
             regular_file(path)
-            search.logs.append(path)
-        elif (path / PROVENANCE).is_file():
-            search.below(path / "logs")
-            search.logs += [plan for plan in (path / name for name in PLANS) if plan.is_file()]
+            found.logs.append(path)
+        elif not (path / PROVENANCE).is_file():
+            _search(path, found)
         else:
-            search.below(path)
-    if not search.logs and not unreadable:
-        raise search.nothing_there(", ".join(map(str, inputs)))
-    return tuple(dict.fromkeys(search.logs)), tuple(search.checks)
+            if (path / "logs").is_dir():
+                _search(path / "logs", found)
+            found.logs.extend(plan for name in PLANS if (plan := path / name).is_file())
+    if found.logs:
+        return tuple(dict.fromkeys(found.logs)), tuple(found.checks)
+    words, remedy = "no log there", "logs end in .h5 or .parquet"
+    if found.passed:
+        words += f"; links and results of rrrid are passed over, here {len(found.passed)}"
+        remedy = f"give what is meant by its own path: {shlex.join(map(str, found.passed[:3]))}"
+    elif found.recordings:
+        words += f", but recordings such as {found.recordings[0].name}"
+        draft = f"rrrid import --guess {shlex.quote(str(found.recordings[0]))}"
+        remedy = f"make logs of them; this drafts the recipe: {draft}"
+    raise NothingMatched("C06", words, ", ".join(map(str, inputs)), remedy)
 
 
-class _Search:
+@dataclass(frozen=True)
+class _Found:
     """The logs below some folders, and what was passed over."""
 
-    def __init__(self, unreadable: list[Path] | None) -> None:
-        self.unreadable = unreadable
-        self.logs: list[Path] = []
-        self.checks: list[Check] = []
-        self.passed: list[Path] = []  # links, and results of rrrid
-        self.recordings: list[Path] = []
+    logs: list[Path]
+    checks: list[Check]
+    passed: list[Path]  # links, and results of rrrid
+    recordings: list[Path]
 
-    def below(self, folder: Path) -> None:
-        """Search a folder and those in it, in order."""
-        try:
-            for entry in sorted(folder.iterdir()):
-                if not entry.name.startswith("."):
-                    self._look_at(entry)
-        except FileNotFoundError:
-            pass  # removed meanwhile
-        except OSError as problem:
-            if self.unreadable is None:
-                raise fault_of(problem, folder) from None
-            self.unreadable.append(folder)
 
-    def _look_at(self, entry: Path) -> None:
-        is_log = entry.suffix.lower() in ENDINGS
-        if entry.is_symlink() and (entry.is_dir() or (is_log and not entry.exists())):
-            words = "link that leads nowhere, or in a circle, passed over"
-            remedy = "remove it, or let it lead to a log"
-            if entry.is_dir():
-                words = "link to a folder passed over"
-                remedy = "give what it leads to by its own path, if that is meant"
-            self.checks.append(Check.of("X11", "warn", words, entry, remedy))
-            self.passed.append(entry)
-        elif entry.is_dir() and (entry / PROVENANCE).is_file():
-            self.passed += [entry] if (entry / "logs").is_dir() else []
-        elif entry.is_dir():
-            self.below(entry)
+def _search(folder: Path, found: _Found) -> None:
+    """Add what is in a folder and in those below it, in order."""
+    try:
+        entries = sorted(folder.iterdir())
+    except OSError as problem:
+        raise fault_of(problem, folder) from None
+    for entry in entries:
+        is_log, is_folder = entry.suffix.lower() in ENDINGS, entry.is_dir()
+        if entry.name.startswith("."):
+            continue
+        if entry.is_symlink() and (is_folder or (is_log and not entry.exists())):
+            what = "to a folder" if is_folder else "that leads nowhere, or in a circle,"
+            remedy = "give what is meant by its own path, or remove it"
+            found.checks.append(Check.of("X11", "warn", f"link {what} passed over", entry, remedy))
+            found.passed.append(entry)
+        elif is_folder and (entry / PROVENANCE).is_file():
+            found.passed.extend([entry] * (entry / "logs").is_dir())
+        elif is_folder:
+            _search(entry, found)
         elif is_log and entry.exists():
-            self.logs.append(entry)
+            found.logs.append(entry)
         elif entry.suffix.lower() in RECORDINGS:
-            self.recordings.append(entry)
-
-    def nothing_there(self, where: str) -> NothingMatched:
-        """Return the error that there is no log (C06), with what to give instead."""
-        passed, remedy = "", "logs end in .h5 or .parquet"
-        if self.passed:
-            passed = f"; links and results of rrrid are passed over, here {len(self.passed)}"
-            if there := [str(path) for path in self.passed if path.is_dir()]:
-                more = " …" if there[3:] else ""
-                remedy = f"give what is meant by its own path: {shlex.join(there[:3])}{more}"
-        elif self.recordings:
-            first = self.recordings[0]
-            passed = f", but recordings such as {first.name}"
-            draft = f"rrrid import --guess {shlex.quote(str(first))}"
-            remedy = f"make logs of them; this drafts the recipe: {draft}"
-        return NothingMatched("C06", f"no log there{passed}", where, remedy)
+            found.recordings.append(entry)

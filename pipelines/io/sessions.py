@@ -238,17 +238,7 @@ def _grouped(logs: Iterable[Opened], named: Collection[Path]) -> dict[Key, list[
             others.append((key, opened))
         else:
             groups[key].append(opened)
-    for key in [key for key in groups if not key[2]]:
-        days = [day for day in _days(groups, key) if day != key]
-        if len(days) == 1:
-            groups[days[0]] += groups.pop(key)
-    judging = [
-        key for key, own in groups.items() if key[2] and all(o.log.role == "validate" for o in own)
-    ]
-    for key in judging:
-        if days := sorted(day for day in _days(groups, key) if day[2] and day not in judging):
-            before = [day for day in days if day < key]
-            groups[before[-1] if before else days[0]] += groups.pop(key)
+    _join_days(groups)
     if not groups:  # what the user named alone is one session
         for key, opened in others:
             if opened.path in named:
@@ -263,6 +253,21 @@ def _grouped(logs: Iterable[Opened], named: Collection[Path]) -> dict[Key, list[
         for day in chosen or _days(groups, key) or [(*key[:2], "")]:
             groups[day].append(opened)
     return groups
+
+
+def _join_days(groups: dict[Key, list[Opened]]) -> None:
+    """Join logs without a date, and days of which all logs judge, with the day they belong to."""
+    for key in [key for key in groups if not key[2]]:
+        days = [day for day in _days(groups, key) if day != key]
+        if len(days) == 1:
+            groups[days[0]] += groups.pop(key)
+    judging = [
+        key for key, own in groups.items() if key[2] and all(o.log.role == "validate" for o in own)
+    ]
+    for key in judging:
+        if days := sorted(day for day in _days(groups, key) if day[2] and day not in judging):
+            before = [day for day in days if day < key]
+            groups[before[-1] if before else days[0]] += groups.pop(key)
 
 
 def _days(groups: Iterable[Key], key: Key) -> list[Key]:

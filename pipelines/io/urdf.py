@@ -166,9 +166,7 @@ def chain_from_urdf(urdf_text: str, tip_link: str | None = None) -> UrdfChain:
     return UrdfChain(tuple(placed), tip, rotation, position)
 
 
-def _placed(
-    rotation: Array, position: Array, origin: tuple[Array, Array]
-) -> tuple[Array, Array]:
+def _placed(rotation: Array, position: Array, origin: tuple[Array, Array]) -> tuple[Array, Array]:
     """Return a frame at xyz, rpy of another: R = Rz(yaw) Ry(pitch) Rx(roll), fixed axes."""
     xyz, rpy = origin
     (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
@@ -215,8 +213,8 @@ class _Builder(TreeBuilder):
         return super().end(tag)
 
 
-def _tree(text: bytes | str) -> _Tree:
-    """Parse a URDF; every child link has one parent, and there is one root."""
+def _parse(text: bytes | str) -> Element:
+    """Return the <robot> of a URDF."""
     if len(text) > URDF.size:
         raise _wrong(f"larger than {URDF.size // 1_000_000} MB", code="X13")
     parser = XMLParser(target=_Builder())
@@ -230,14 +228,19 @@ def _tree(text: bytes | str) -> _Tree:
         if robot.tag in _OTHER_FORMATS:
             words = f"this is {_OTHER_FORMATS[robot.tag]}, not a URDF"
         raise _wrong(words, "export a URDF of the arm, or give the one it was made from")
+    return robot
+
+
+def _tree(text: bytes | str) -> _Tree:
+    """Return the tree of a URDF: every child link has one parent, and there is one root."""
+    robot = _parse(text)
     elements, joints = robot.findall("link"), list(map(_joint, robot.findall("joint")))
     links = {_name(element): element for element in elements}
-    for kind, names in (
-        ("links", [_name(element) for element in elements]),
-        ("joints", [joint.name for joint in joints]),
-    ):
-        if twice := [name for name, count in Counter(names).items() if count > 1]:
-            raise _wrong(f"two {kind} are called '{twice[0]}'")
+    names = {"links": map(_name, elements), "joints": (joint.name for joint in joints)}
+    for kind, own in names.items():
+        name, count = Counter(own).most_common(1)[0] if joints and elements else ("", 0)
+        if count > 1:
+            raise _wrong(f"two {kind} are called '{name}'")
     tree = _Tree(_text(robot, "name") or "robot", links, {}, "")
     for joint in joints:
         for end in (joint.parent, joint.child):
@@ -251,7 +254,9 @@ def _tree(text: bytes | str) -> _Tree:
         tree.out_of.setdefault(joint.parent, []).append(joint)
     roots = [name for name in links if name not in tree.into]
     if len(roots) != 1:
-        words = f"links {', '.join(roots)} hang on nothing" if roots else "every link hangs on another"
+        words = (
+            f"links {', '.join(roots)} hang on nothing" if roots else "every link hangs on another"
+        )
         loose = ", ".join(name for name in roots if name not in tree.out_of)
         remedy = "connect all links into one tree"
         remedy += f", or delete those without joints: {loose}" if loose else ""

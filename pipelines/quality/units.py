@@ -1,4 +1,4 @@
-"""Check the units of a log: whether numbers declared in N m and rad are torques and angles in them."""
+"""Check the units of a log: whether torques declared in N m and angles in rad can be in them."""
 
 from __future__ import annotations
 
