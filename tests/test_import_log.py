@@ -150,13 +150,3 @@ def test_s07_motor_positions_are_named_with_the_ratio_they_need(folder: Path) ->
         run(folder, recipe)
     assert 'unit = "deg"' in problem.value.remedy
     assert "transmission = the gear ratios of at least 12" in problem.value.remedy
-
-
-def test_s08_milliseconds_declared_as_seconds_are_asked_about(folder: Path) -> None:
-    """A warning: nothing in the recording contradicts it, but no arm is that slow. Declared as they are there is none."""
-    write(folder, text(good() | {"t": np.arange(1200) * 1.0}))
-    (check,) = run(folder).checks
-    assert (check.code, check.level, check.gate) == ("RRID-S08", "warn", False)
-    assert "with steps in ms, joint" in check.message
-    assert 'unit = "ms"' in check.remedy
-    assert not run(folder, RECIPE.replace('unit = "s"', 'unit = "ms"')).checks

@@ -11,7 +11,6 @@ from pipelines.io.sessions import (
     Inputs,
     SeveralSessions,
     apart,
-    called,
     of_one_session,
 )
 from tests.io.logs import ROBOT_TEXT, small_log
@@ -46,35 +45,10 @@ def test_what_the_user_named_for_a_role_goes_with_every_day() -> None:
     assert list(together(first, second, named=(third,)).values()) == [{"a", "c"}, {"b", "c"}]
 
 
-def test_a_robot_of_one_day_is_called_by_its_name() -> None:
-    """Without its date, as long as it has no other."""
-    a, b, later = (opened("a", robot_name="arm-a", recorded=DAY), opened("b", robot_name="arm-b", recorded=DAY),
-                   opened("c", robot_name="arm-a", recorded=NEXT))
-    one = called("arm-a", apart((a, b)))
-    assert one is not None
-    assert one.logs == (a,)
-    assert called("arm-a", apart((a, b, later))) is None
-
-
-@pytest.mark.parametrize(("times", "sessions"), [
-    (("2026-03-02T22:30:00Z", "2026-03-02T23:50:00Z", "2026-03-03T00:20:00Z"), 1),  # an afternoon on the west coast
-    (("2026-03-02T22:30:00Z", "2026-03-03T02:00:00Z"), 2),  # a pause of more than three hours
-    (("2026-03-02T10:00:00Z", "2026-03-02T23:50:00Z", "2026-03-03T00:20:00Z"), 2),  # fourteen hours in all
-    (("2026-03-02T23:50:00Z", "2026-03-03"), 2),  # nobody told the hour
-    (("2026-03-02T23:50:00Z", "2026-03-04T00:10:00Z"), 2),
-])
-def test_midnight_alone_ends_no_session(times: tuple[str, ...], sessions: int) -> None:
-    """Days are UTC: a session may begin on one and end on the next. A machine that logs every hour still has its days."""
-    logs = [opened(str(i), recorded=time) for i, time in enumerate(times)]
-    assert len(together(*logs)) == sessions
-    hourly = [opened(str(i), recorded=f"2026-03-{2 + i // 24:02d}T{i % 24:02d}:00:00Z") for i in range(72)]
-    assert len(together(*hourly)) == 3
-
-
 def test_several_robots_are_refused_with_the_names_of_all() -> None:
     """The error says what is whose."""
     a, b = opened("a", robot_name="arm-a"), opened("b", "other", robot_name="arm-b")
-    with pytest.raises(SeveralSessions, match=r"several robots: arm-a.* \(1 log in logs\); arm-b.* \(1 log in other\)") as refused:
+    with pytest.raises(SeveralSessions, match=r"several robots: arm-a.* \(a\.h5\); arm-b.* \(b\.h5\)") as refused:
         of_one_session(Inputs((a, b)))
     assert [name.split()[0] for name in refused.value.names] == ["arm-a", "arm-b"]
     assert refused.value.exit_code == 2
