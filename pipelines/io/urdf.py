@@ -238,7 +238,7 @@ def _tree(text: bytes | str) -> _Tree:
     links = {_name(element): element for element in elements}
     names = {"links": map(_name, elements), "joints": (joint.name for joint in joints)}
     for kind, own in names.items():
-        name, count = Counter(own).most_common(1)[0] if joints and elements else ("", 0)
+        name, count = max(Counter(own).items(), key=lambda one: one[1], default=("", 0))
         if count > 1:
             raise _wrong(f"two {kind} are called '{name}'")
     tree = _Tree(_text(robot, "name") or "robot", links, {}, "")
