@@ -203,7 +203,7 @@ _CYCLE = _robot(_joint("j0", "d", "a"), _joint("j1", "a", "b"), _joint("j2", "b"
     (_robot(_joint("j", "a", "b", inside='<origin xyz="0 nan 0"/>'), links="ab"), "not finite"),
     (_robot(_joint("j", "a", "b", inside='<origin xyz="0 1e300 0"/>'), links="ab"), "absurdly large"),
     (_robot(_joint("j", "a", "b", inside='<origin xyz="0 1_0 0"/>'), links="ab"), "not a number"),
-    (_robot(_joint("j", "a", "b", inside='<origin xyz="0 0,1 0"/>'), links="ab"), "'0,1', which is not a number"),
+    (_robot(_joint("j", "a", "b", inside='<origin xyz="0 0,1 0"/>'), links="ab"), "'0 0,1 0', which is not a number"),
     (_robot(_joint("j", "a", "b", inside='<limit lower="2" upper="1"/>'), links="ab"), "lower above upper"),
     (_robot(_joint("j", "a", "b", inside='<limit velocity="-1"/>'), links="ab"), "negative velocity"),
     (_robot('<joint name="j" type="revolute"><parent link="a"/></joint>'), "lacks its parent or child"),
