@@ -129,9 +129,9 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
     rejected: list[Rejected] = []
     for index, path in enumerate(paths, 1):
         request.tell(f"reading {path.name} ({index} of {len(paths)})")
-        options = {"assume_units": request.assume_units, "joints": request.joints}
+        units, joints = request.assume_units, request.joints
         try:
-            opened = open_log(path, **options, robot=robot)
+            opened = open_log(path, assume_units=units, joints=joints, robot=robot)
         except InputRejected as problem:
             rejected.append(Rejected(path, problem))
             continue
