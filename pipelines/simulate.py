@@ -145,8 +145,7 @@ def _names(stem: str, replicas: int) -> set[str]:
 
 def _tracking(log: ExperimentLog, one: Imitation) -> Array | None:
     """Return the RMS (joints,) of measured minus reference position; feedback keeps it small."""
-    feedback = one.simulation != "windowed" and one.law != "open-loop" and "q_ref" in log
-    if one.position_rms is None or not feedback:
+    if one.position_rms is None or one.simulation == "windowed" or "q_ref" not in log:
         return None
     return np.asarray(np.sqrt(np.nanmean((log.q - log["q_ref"]) ** 2, axis=0)))
 

@@ -117,3 +117,13 @@ def test_the_command(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "out/provenance.json").read_text())["seed"] == 7
     missing = rrrid("simulate", "rrr", cwd=tmp_path)
     assert (missing.returncode, "--replay" in missing.stderr) == (2, True)
+
+
+def test_an_open_loop_log_is_compared_in_windows(tmp_path: Path) -> None:
+    """Nothing corrects its moving joint: the report says why it is no closed loop."""
+    log = controlled_log(SAMPLES)
+    assert log.controller is not None
+    friction = replace(log, experiment="friction", joint=3, controller=replace(log.controller, law="open-loop"))
+    [found] = simulated(friction, tmp_path, Settings("rrr")).result.logs
+    assert (found.simulation, found.law) == ("windowed", "open-loop")
+    assert "open loop" in found.reason

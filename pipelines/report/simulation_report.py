@@ -78,9 +78,7 @@ def _rms(one: Imitation) -> Array:
 
 
 def _how(one: Imitation) -> str:
-    if one.simulation == "windowed":
-        return "windows"
-    return "open loop" if one.law == "open-loop" else "closed loop"
+    return "windows" if one.simulation == "windowed" else "closed loop"
 
 
 def _key_figures(logs: Sequence[Imitation], tracking: Sequence[Array | None]) -> Table:
@@ -117,8 +115,7 @@ def _section(one: Imitation, course: Course) -> Section:
 
 def _figures(one: Imitation, s: Course) -> list[Figure]:
     unit, name = one.units[0], one.name
-    density = None if one.law == "open-loop" else s.position_density  # of a drift it says nothing
-    position = (s.position, s.position_simulated, s.position_difference, density)
+    position = (s.position, s.position_simulated, s.position_difference, s.position_density)
     figures = _signal_figures(name, "position", unit, s, *position)
     if s.elapsed is not None and s.drift is not None:
         draw = partial(draw_drift, elapsed=s.elapsed, drift=s.drift, unit=unit)

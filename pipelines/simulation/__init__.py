@@ -16,6 +16,15 @@ from pipelines.simulation.replay import Windows, simulate_windows
 from pipelines.simulation.step import Step, choose_step, simulate
 
 __all__ = [
-    "Experiment", "Noise", "Plant", "Simulated", "Step", "Windows", "choose_step", "run",
-    "run_together", "simulate", "simulate_windows",
+    "Experiment",
+    "Noise",
+    "Plant",
+    "Simulated",
+    "Step",
+    "Windows",
+    "choose_step",
+    "run",
+    "run_together",
+    "simulate",
+    "simulate_windows",
 ]

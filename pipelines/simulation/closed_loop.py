@@ -26,7 +26,7 @@ from pipelines.simulation.plant import Plant, refuse_runaway
 
 __all__ = ["Noise", "Simulated", "run", "run_together", "runs_alone"]
 
-_CHUNK = 2048  # numerics: samples whose noise is drawn at once, or that are Python numbers at once
+_CHUNK = 2048  # numerics: samples whose noise is drawn at once
 _LOOKS = 64  # numerics: samples between two looks at whether an arm runs away
 
 
@@ -82,12 +82,7 @@ def run_together(
     seeds: Iterable[int] = (0,),
     exact: bool = True,
 ) -> list[Simulated]:
-    """`run` several experiments at once, which costs hardly more than the longest alone.
-
-    Raises:
-        InputRejected: D15, the model's inertia matrix is singular or worse; D17, the simulated arm
-            runs away.
-    """
+    """`run` several experiments at once, which costs hardly more than the longest alone."""
     drawn = tuple(seeds)
     lanes = [_Lane(plant, one, noise or Noise.none(one.n_joints), drawn) for one in experiments]
     few = len(lanes) * len(drawn) <= SIMULATION.few
@@ -103,9 +98,8 @@ def run_together(
 
 def runs_alone(plant: Plant, experiment: Experiment) -> bool:
     """Return whether plain numbers are enough: torque hangs on reference and error alone."""
-    law = experiment.controller.law in ("pd", "pd+feedforward") and experiment.driven is None
     alike = experiment.v is None or experiment.v.ndim == experiment.q_ref.ndim
-    return law and alike and OneArm.fits(plant)
+    return alike and experiment.controller.law != "computed-torque" and OneArm.fits(plant)
 
 
 class _Lane:
@@ -117,13 +111,10 @@ class _Lane:
         postures = max(1, experiment.n_samples // SIMULATION.postures)
         plant.refuse_unphysical(experiment.q_ref[::postures])
         replicas, n, samples = len(seeds), experiment.n_joints, experiment.n_samples
-        moving = plant.prepared(replicas)
         self.plant, self.experiment, self.noise, self.seeds = plant, experiment, noise, seeds
         self.t = np.full(replicas, experiment.start_time)
-        begin = np.concatenate([experiment.q0, experiment.dq0])[:, None]
-        begin = np.repeat(begin, replicas, axis=1)
-        self.state = np.ascontiguousarray(moving.settled(self.t, begin[:n], begin[n:]))
-        self.states = moving.at_start(self.t, self.state[:n], self.state[n:])
+        q, dq = (np.repeat(x[:, None], replicas, axis=1) for x in (experiment.q0, experiment.dq0))
+        self.state, self.states = plant.prepared(replicas).begin(self.t, q, dq)
         self.counted, self.commanded = np.empty((2, samples, n, replicas))
         self.motion = np.empty((samples, 2 * n, replicas))
         self.draws = _draws(noise, seeds, samples)
@@ -138,14 +129,12 @@ class _Lane:
         return command + extra_torque
 
     def simulated(self, steps: int) -> Simulated:
-        experiment, n = self.experiment, self.experiment.n_joints
-        q, tau, moved = (
-            np.ascontiguousarray(np.moveaxis(x, 2, 0))
-            for x in (self.counted, self.commanded, self.motion)
-        )
+        t, n = self.experiment.t, self.experiment.n_joints
+        logged = self.counted, self.commanded, self.motion
+        q, tau, moved = (np.ascontiguousarray(np.moveaxis(x, 2, 0)) for x in logged)
         if self.plant.records:
-            tau = np.stack([self.plant.logged(experiment.t, one) for one in tau])
-        return Simulated(experiment.t, q, tau, moved[..., :n], moved[..., n:], steps)
+            tau = np.stack([self.plant.logged(t, one) for one in tau])
+        return Simulated(t, q, tau, moved[..., :n], moved[..., n:], steps)
 
 
 @np.errstate(all="ignore")  # numbers of an arm that runs away are not finite before it is refused
@@ -157,15 +146,11 @@ def _advance(plant: Plant, lanes: Sequence[_Lane], steps: int, exact: bool) -> N
     t = np.concatenate([lane.t for lane in lanes])
     state = np.concatenate([lane.state for lane in lanes], axis=1)
     states = np.concatenate([lane.states for lane in lanes])
-    parts = [slice(i * width, (i + 1) * width) for i in range(len(lanes))]
+    parts = [(lane, slice(i * width, (i + 1) * width)) for i, lane in enumerate(lanes)]
     applied = np.zeros((n, len(t)))
     for k in range(max(lane.experiment.n_samples for lane in lanes)):
         seen = moving.measured(state[:n], states)
-        running = [
-            (lane, part)
-            for lane, part in zip(lanes, parts, strict=True)
-            if k < lane.experiment.n_samples
-        ]
+        running = [(lane, part) for lane, part in parts if k < lane.experiment.n_samples]
         for lane, part in running:
             applied[:, part] = lane.applied(k, state[:, part], seen[:, part])
         states = moving.updated(t, state[:n], state[n:], states, applied)
@@ -182,12 +167,14 @@ def _run_alone(arm: OneArm, lane: _Lane, replica: int) -> None:
     laws = [Feedback(experiment, joint) for joint in range(experiment.n_joints)]
     draws = _draws(lane.noise, (lane.seeds[replica],), experiment.n_samples)
     x: list[float] = [*lane.state[:, replica].tolist(), *lane.states[replica].tolist()]
-    rows = zip(_listed(experiment.q_ref), _listed(ahead_of(experiment)), draws, strict=True)
+    rows = zip(experiment.q_ref, ahead_of(experiment), draws, strict=True)
     for k, (reference, ahead, (torque, position)) in enumerate(rows):
         lane.motion[k, :, replica] = x[:6]
-        angles, seen, said = _more(x[:3], position), [], []
+        seen, said = [], []
         try:
-            for law, angle, wanted, more in zip(laws, angles, reference, ahead, strict=True):
+            angles = (x[:3] + position[:, 0]).tolist()
+            each = zip(laws, angles, reference.tolist(), ahead.tolist(), strict=True)
+            for law, angle, wanted, more in each:
                 q = angle if law.counts is None else law.counts(angle)
                 seen.append(q)
                 said.append(law.delayed(law.limited(law(q - wanted, more))))
@@ -196,34 +183,16 @@ def _run_alone(arm: OneArm, lane: _Lane, replica: int) -> None:
         if k % _LOOKS == 0 or x[0] != x[0]:
             refuse_runaway(np.array(x[:6])[:, None], k, time)
         lane.counted[k, :, replica], lane.commanded[k, :, replica] = seen, said
-        x = arm.moved(x, _more(said, torque))
+        x = arm.moved(x, (said + torque[:, 0]).tolist())
     refuse_runaway(np.array(x[:6])[:, None], experiment.n_samples, time)
 
 
-def _more(numbers: list[float], drawn: Array | float) -> list[float]:
-    """Return numbers and the noise (joints, 1) on them, or zero."""
-    if isinstance(drawn, float):
-        return numbers
-    return [a + b for a, b in zip(numbers, drawn[:, 0].tolist(), strict=True)]
-
-
-def _listed(x: Array) -> Iterator[list[float]]:
-    """Yield the rows of `x` as lists; all at once would take ten times the room."""
-    for first in range(0, len(x), _CHUNK):
-        yield from x[first : first + _CHUNK].tolist()
-
-
-def _draws(
-    noise: Noise, seeds: tuple[int, ...], samples: int
-) -> Iterator[tuple[Array | float, Array | float]]:
+def _draws(noise: Noise, seeds: tuple[int, ...], samples: int) -> Iterator[tuple[Array, Array]]:
     """Yield torque and position noise (joints, replicas) of each sample.
 
     Every replica has a generator of its own, so that it does the same alone and among others.
     """
     size, n = np.concatenate([noise.torque, noise.position]), len(noise.torque)
-    if not size.any():
-        yield from itertools.repeat((0.0, 0.0), samples)
-        return
     generators = [np.random.default_rng(seed) for seed in seeds]
     for first in range(0, samples, _CHUNK):
         shape = (min(_CHUNK, samples - first), len(size))

@@ -5,10 +5,8 @@
 A controller that the log describes, with its gains and references, says to the last digit what it
 commanded, whatever the arm did. A torque that is that, but so many times as large, or so much
 later, was not recorded as the drive got it: motor current, another side of the gear, another clock.
-Where it is something else the controller's description may be wrong, and nothing is said. A drive
-that gives more or less than it is told is none of this: what is logged is what it was told. Of a
-torque that was measured it is not: what a drive makes of its command, or a recorder that smooths
-what it logs, is a cause for `diagnose` then.
+Where it is something else the controller's description may be wrong, and nothing is said. What a
+drive makes of its command, or a recorder that smooths what it logs, is a cause for `diagnose`.
 """
 
 from __future__ import annotations
@@ -17,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.dynamics.first_order import lagging
 from pipelines.errors import Check, InputRejected
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.quality.subject import Subject
@@ -47,14 +46,12 @@ def commanded(log: ExperimentLog) -> Array | None:
 
     Returns None where the log does not say how it was controlled, or has gaps.
     """
-    if log.controller is None or log.controller.law == "open-loop" or "tau" not in log:
-        return None
     try:
         experiment = Experiment.of_log(log)
     except InputRejected:
         return None
     model = experiment.feedforward_arm
-    if model is not None and model.n_joints != log.n_joints:
+    if "tau" not in log or (model is not None and model.n_joints != log.n_joints):
         return None
     known = np.isfinite(log.q).all(axis=1)
     count = min(COMMAND.longest, log.n_samples if known.all() else int(np.argmin(known)))
@@ -74,14 +71,12 @@ def against_command(s: Subject) -> tuple[Check, ...]:
     wanted = commanded(s.log)
     if wanted is None:
         return ()
-    most = round(COMMAND.latest / s.log.sample_time)
-    likes: dict[int, Likeness] = {}
-    for j in range(s.log.n_joints):
-        like = _likeness(s.log.tau[:len(wanted), j], wanted[:, j], most)
-        if like is not None and like.sure:
-            likes[j] = like
-    every = len(likes) == s.log.n_joints and all(_scaled(s, like) for like in likes.values())
-    said = (_said(s, j, like, wanted[:, j], every) for j, like in likes.items())
+    latest = round(COMMAND.latest / s.log.sample_time)
+    pairs = enumerate(zip(s.log.tau[: len(wanted)].T, wanted.T, strict=True))
+    likes = {j: _likeness(tau, command, latest) for j, (tau, command) in pairs}
+    sure = {j: like for j, like in likes.items() if like is not None and like.sure}
+    every = len(sure) == s.log.n_joints and all(_scaled(s, like) for like in sure.values())
+    said = (_said(s, j, like, wanted[:, j], every) for j, like in sure.items())
     return tuple(check for check in said if check is not None)
 
 
@@ -91,51 +86,42 @@ def _scaled(s: Subject, like: Likeness) -> bool:
 
 
 def _said(s: Subject, j: int, like: Likeness, wanted: Array, every: bool) -> Check | None:
-    late, size, here = like.late * s.log.sample_time, abs(like.scale), f"tau of joint {j + 1} is"
+    late, size = like.late * s.log.sample_time, abs(like.scale)
     if like.scale < 0.0:
         code, words = "S14", f"{like.scale:.3g} times what the controller of this log commands"
-        remedy = ("change the sign of this torque on import, or those of the controller's gains")
+        remedy = "change the sign of this torque on import, or those of the controller's gains"
     elif _scaled(s, like):
-        code = "S10" if every else "S15"
-        what = "another gear ratio or torque constant"
+        code, what = "S15", "another gear ratio or torque constant"
         if every:
-            what = "motor current in A, or torque of another side of the gear"
-        words = (f"{size:.3g} times what the controller of this log commands: {what}; or its "
-                 f"position and reference are {1.0 / size:.3g} times as large as they should be")
-        remedy = (f"divide it by {size:.3g}: import the recording anew with torque constants and "
-                  "gear ratios, or declare its unit; or correct the gains of the controller")
+            code, what = "S10", "motor current in A, or torque of another side of the gear"
+        words = f"{size:.3g} times what the controller of this log commands: {what}; or its "
+        words += f"position and reference are {1.0 / size:.3g} times as large as they should be"
+        remedy = f"divide it by {size:.3g}: import the recording anew with torque constants and "
+        remedy += "gear ratios, or declare its unit; or correct the gains of the controller"
     elif s.log.torque != "measured" and _stamped(s, j, like, wanted):
-        side = "after" if late > 0 else "before"
-        code = "T06"
+        code, side = "T06", "after" if late > 0 else "before"
         words = f"stamped {1e3 * abs(late):.3g} ms {side} the controller of this log commands it"
-        remedy = ("stamp position and torque by one clock: shift this torque by as much on import; "
-                  "or correct the gains of the controller")
+        remedy = "stamp position and torque by one clock: shift this torque by as much on import; "
+        remedy += "or correct the gains of the controller"
     else:
         return None
-    return s.say(code, "warn", f"{here} {words}", signal="tau", joint=j, gate=True, remedy=remedy)
+    words = f"tau of joint {j + 1} is {words}"
+    return s.say(code, "warn", words, signal="tau", joint=j, gate=True, remedy=remedy)
 
 
 def _stamped(s: Subject, j: int, like: Likeness, wanted: Array) -> bool:
     """Return whether a torque is the command at another time, not smoothed by a recorder."""
-    late = abs(like.late)
+    late, tau = abs(like.late), s.log.tau[: len(wanted), j]
     if late <= COMMAND.samples or late * s.log.sample_time < COMMAND.late:
         return False
     if like.left > COMMAND.left_late:
         return False
-    tau = s.log.tau[:len(wanted), j]
-    lags = [factor * like.late for factor in COMMAND.lags] if like.late > 0 else []
-    return all(_smoothed_left(tau, wanted, lag) > like.left for lag in lags)
-
-
-def _smoothed_left(tau: Array, command: Array, samples: float) -> float:
-    """Return the share of the torque's deviation that a low-pass of the command leaves of it."""
-    keep, now, lagged = float(np.exp(-1.0 / samples)), float(command[0]), []
-    for value in command.tolist():
-        now = keep * now + (1.0 - keep) * value
-        lagged.append(now)
-    late = max(1, round(5.0 * samples))  # until it has forgotten where it began
-    x, y = np.array(lagged[late:]), tau[late:]
-    return float(np.std(y - x) / max(float(np.std(y)), 1e-300)) if len(x) > 1 else np.inf
+    t = np.arange(len(wanted), dtype=np.float64)
+    for lag in [factor * late for factor in COMMAND.lags] if like.late > 0 else []:
+        off = (tau - lagging(wanted, t, lag, digital=True))[max(1, round(5.0 * lag)) :]
+        if len(off) > 1 and np.std(off) <= like.left * max(float(np.std(tau)), 1e-300):
+            return False
+    return True
 
 
 def _likeness(tau: Array, command: Array, most: int) -> Likeness | None:
@@ -144,9 +130,9 @@ def _likeness(tau: Array, command: Array, most: int) -> Likeness | None:
     No more than `most` samples later or earlier.
     """
     n = len(tau)
-    if n <= 4 * most or not np.isfinite(tau).all() or np.std(tau) == 0.0 or np.std(command) == 0.0:
+    if n <= 4 * most or not np.isfinite(tau).all() or np.std(command) == 0.0:
         return None
-    inner = tau[most:n - most]
+    inner = tau[most : n - most]
     if np.ptp(inner) == 0.0:
         return None
     # row k: the command k - most samples before
@@ -157,4 +143,4 @@ def _likeness(tau: Array, command: Array, most: int) -> Likeness | None:
     best = int(np.argmin(left))
     scale = float(product[best] / max(power[best], 1e-300))
     plain = float(np.sum(np.square(y - x[most])) / float(y @ y))
-    return Likeness(scale, best - most, plain**0.5, max(float(left[best]), 0.0)**0.5)
+    return Likeness(scale, best - most, plain**0.5, max(float(left[best]), 0.0) ** 0.5)

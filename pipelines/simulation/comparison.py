@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.body import Motion
@@ -27,8 +26,16 @@ from pipelines.simulation.plant import Plant
 from pipelines.simulation.replay import Windows, held_torque, simulate_windows
 from pipelines.simulation.step import choose_step
 
-__all__ = ["Positions", "SimulatedSpan", "Simulation", "Strayed", "in_loop", "in_loops", "nearer",
-           "simulation_errors"]
+__all__ = [
+    "Positions",
+    "SimulatedSpan",
+    "Simulation",
+    "Strayed",
+    "in_loop",
+    "in_loops",
+    "nearer",
+    "simulation_errors",
+]
 
 # simulated and measured (samples, joints) [rad], and the time between samples [s]
 Positions = tuple[Array, Array, float]
@@ -83,19 +90,18 @@ def simulation_errors(arms: Sequence[Arm], motions: Motions) -> list[Simulation]
     follows.
     """
     none = [Simulation.none(arm.n_joints) for arm in arms]
-    if not motions:
+    logs = motions[: SIMULATION.logs]
+    if not logs:
         return none
-    logs = motions[:SIMULATION.logs]
     hooks = [hook for arm in arms for hook in Plant.of(arm).hooks]
     soft = any(hook.rate or hook.remembering for hook in hooks)
     slow = soft or any(hook.actuator and hook.states for hook in hooks)
     if all(in_loop(arms[0], log) for log, _ in logs):
         longest = SIMULATION.longest_soft if slow else SIMULATION.longest
         found = _errors(arms, logs, in_loops(arms, logs, longest), closed=True)
-        first, last = found[0], found[-1]
-        unsure = first is not last and "none" not in (first.how, last.how)
+        unsure = len(arms) > 1 and "none" not in (found[0].how, found[-1].how)
         more = any(log.n_samples * log.sample_time > longest for log, _ in logs)
-        if more and unsure and not nearer(first, last):
+        if more and unsure and not nearer(found[0], found[-1]):
             positions = in_loops(arms, logs, SIMULATION.longer * longest)
             longer = _errors(arms, logs, positions, closed=True)
             found = found if longer[0].how == "none" else longer
@@ -115,8 +121,7 @@ def in_loop(arm: Arm, log: ExperimentLog) -> bool:
     return True
 
 
-def in_loops(arms: Sequence[Arm], motions: Motions,
-             seconds: float) -> list[list[Positions] | None]:
+def in_loops(arms: Sequence[Arm], motions: Motions, seconds: float) -> list[list[Positions] | None]:
     """Return the positions of each arm in each log, over its first `seconds`.
 
     The entry of an arm that runs away, or that cannot be simulated, is None. The step that suffices
@@ -125,11 +130,8 @@ def in_loops(arms: Sequence[Arm], motions: Motions,
     Raises:
         InputRejected: a log does not describe its controller.
     """
-    parts = []
-    for log, _ in motions:
-        experiment = Experiment.of_log(log)
-        samples = min(experiment.n_samples, round(seconds / log.sample_time))
-        parts.append(experiment.part(0, samples))
+    logs = [log for log, _ in motions]
+    parts = [Experiment.of_log(log).part(0, round(seconds / log.sample_time)) for log in logs]
     found: list[list[Positions] | None] = []
     for plant in map(Plant.of, arms):
         try:
@@ -138,17 +140,25 @@ def in_loops(arms: Sequence[Arm], motions: Motions,
         except InputRejected:  # D15, D17
             found.append(None)
             continue
-        pairs = [(one.q[0], log) for one, (log, _) in zip(moved, motions, strict=True)]
-        found.append([(q, log.q[:len(q)], log.sample_time) for q, log in pairs])
+        found.append(
+            [
+                (one.q[0], log.q[: len(one.t)], log.sample_time)
+                for one, log in zip(moved, logs, strict=True)
+            ]
+        )
     return found
 
 
-def _errors(arms: Sequence[Arm], motions: Motions, every: Sequence[list[Positions] | None],
-            closed: bool) -> list[Simulation]:
+def _errors(
+    arms: Sequence[Arm], motions: Motions, every: Sequence[list[Positions] | None], closed: bool
+) -> list[Simulation]:
     """Return how far each arm is off, of its positions in each log."""
-    return [Simulation.none(arm.n_joints) if positions is None
-            else _error(arm, motions, positions, closed)
-            for arm, positions in zip(arms, every, strict=True)]
+    return [
+        Simulation.none(arm.n_joints)
+        if positions is None
+        else _error(arm, motions, positions, closed)
+        for arm, positions in zip(arms, every, strict=True)
+    ]
 
 
 def _error(arm: Arm, motions: Motions, positions: Sequence[Positions], closed: bool) -> Simulation:
@@ -159,39 +169,32 @@ def _error(arm: Arm, motions: Motions, positions: Sequence[Positions], closed: b
         away.append(np.sum(np.square(arm.body.tip(q[known]) - arm.body.tip(seen[known])), axis=1))
         span.append(SimulatedSpan(log.name, between * int(known.sum())))
         measured.append(seen[np.isfinite(seen).all(axis=1)])
-    each = np.concatenate(square)
+    each, turning = np.concatenate(square), arm.robot.revolute
+    # added up in radians or metres; where some joints turn and others slide, in units of what each
+    # was measured to do, and what is held there has no say, for a hair is all it moves
+    unit = np.ones(len(turning))
+    if any(turning) and not all(turning):
+        spread = np.std(np.concatenate(measured), axis=0)
+        unit = np.where(spread > SIMULATION.still, spread, np.inf)
     block = np.arange(len(each)) * SIMULATION.blocks // max(len(each), 1)
-    weighted = each @ _units(arm, measured)**-2
-    power = np.bincount(block, weighted, minlength=SIMULATION.blocks).astype(np.float64)
+    power = np.bincount(block, each @ unit**-2, minlength=SIMULATION.blocks).astype(np.float64)
     (log, _), (q, seen, _) = motions[0], positions[0]
-    first = Strayed(log.name, log.t[:len(q)] - log.t[0], q - seen) if closed else None
-    return Simulation("closed-loop" if closed else "windowed", np.sqrt(each.mean(axis=0)),
-                      float(np.sqrt(np.mean(np.concatenate(away)))), power, first, tuple(span))
-
-
-def _units(arm: Arm, seen: Sequence[Array]) -> Array:
-    """Return the units (joints,) in which errors of several joints are added up.
-
-    Radians, or metres; where some joints turn and others slide, the standard deviation of what each
-    was measured to do. What is held there has no say, for a hair is all it moves.
-    """
-    turning = arm.robot.revolute
-    if all(turning) or not any(turning):
-        return np.ones(len(turning))
-    spread = np.std(np.concatenate(seen), axis=0)
-    return np.asarray(np.where(spread > SIMULATION.still, spread, np.inf))
+    first = Strayed(log.name, log.t[: len(q)] - log.t[0], q - seen) if closed else None
+    how: Literal["closed-loop", "windowed"] = "closed-loop" if closed else "windowed"
+    tip = float(np.sqrt(np.mean(np.concatenate(away))))
+    return Simulation(how, np.sqrt(each.mean(axis=0)), tip, power, first, tuple(span))
 
 
 def _in_windows(arm: Arm, motions: Motions, exact: float) -> list[Positions] | None:
     """Return the positions of an arm that is driven by the logged torque; None if it runs away.
 
-    The steps that suffice for a log suffice for the next.
+    The steps that suffice for a log suffice for the next, unless that one is livelier.
     """
     pairs: list[Positions] = []
     steps: dict[float, int] = {}
     try:
         for log, found in motions:
-            windows, motion, between = _windowed(arm, log, found, exact, steps.get(log.sample_time))
+            motion, between, windows = _windowed(arm, log, found, exact, steps.get(log.sample_time))
             steps[log.sample_time] = windows.steps
             pairs.append((windows.q, motion.q, between))
     except InputRejected:  # D15, D17, T08
@@ -199,34 +202,33 @@ def _in_windows(arm: Arm, motions: Motions, exact: float) -> list[Positions] | N
     return pairs
 
 
-def _windowed(arm: Arm, log: ExperimentLog, found: Reconstructed, exact: float,
-              steps: int | None) -> tuple[Windows, Motion, float]:
-    """Return the windows, the measured motion, and the time between its samples [s]."""
+def _windowed(
+    arm: Arm, log: ExperimentLog, found: Reconstructed, exact: float, steps: int | None
+) -> tuple[Motion, float, Windows]:
+    """Return the measured motion, the time between its samples [s], and the windows.
+
+    Of a fast log every Nth sample, and the mean torque until the next.
+    """
+    motion, tau, time = found.motion, held_torque(log), log.sample_time
     usable = np.zeros(log.n_samples, dtype=bool)
     usable[found.good.kept] = found.good.fit
-    motion, tau, usable, every = _coarser(found.motion, held_torque(log), usable, log.sample_time)
-    between = every * log.sample_time
+    every = max(1, int(SIMULATION.fine / time * (1.0 + 1e-9)))  # numerics: rounding
+    if every > 1:
+        steps_of_time = np.diff(motion.t, append=motion.t[-1] + time)
+        usable &= np.abs(steps_of_time - time) <= 0.5 * time
+        whole = len(tau) // every * every
+        usable = usable[:whole].reshape(-1, every).all(axis=1)
+        tau = tau[:whole].reshape(len(usable), every, -1).mean(axis=1)
+        some = slice(0, whole, every)
+        motion = Motion(motion.t[some], motion.q[some], motion.dq[some], motion.ddq[some])
+    between = every * time
     length = max(SIMULATION.window_samples, round(SIMULATION.window / between))
-    for count in dict.fromkeys((steps, None)):  # livelier than the log they were chosen for?
-        windows = simulate_windows(Plant.of(arm), motion, tau, between, length, usable, exact,
-                                   count)
+    for count in dict.fromkeys((steps, None)):
+        windows = simulate_windows(
+            Plant.of(arm), motion, tau, between, length, usable, exact, count
+        )
         if np.isfinite(windows.q[windows.first[:, None] + np.arange(length)]).all():
-            return windows, motion, between
+            return motion, between, windows
     # left out, it would count as no error at all
-    raise InputRejected("D17", "the arm runs away in a window", where=log.name,
-                        remedy="look at its inertia")
-
-
-def _coarser(motion: Motion, tau: Array, usable: npt.NDArray[np.bool_],
-             sample_time: float) -> tuple[Motion, Array, npt.NDArray[np.bool_], int]:
-    """Return every Nth sample of a motion, the mean torque until the next, and what is usable."""
-    every = max(1, int(SIMULATION.fine / sample_time * (1.0 + 1e-9)))  # numerics: rounding
-    if every == 1:
-        return motion, tau, usable, 1
-    count = len(tau) // every
-    steps = np.diff(motion.t, append=motion.t[-1] + sample_time)
-    good = np.asarray(usable & ~(np.abs(steps - sample_time) > 0.5 * sample_time))
-    some = slice(0, count * every, every)
-    thin = Motion(motion.t[some], motion.q[some], motion.dq[some], motion.ddq[some])
-    mean = np.asarray(tau[:count * every].reshape(count, every, -1).mean(axis=1))
-    return thin, mean, np.asarray(good[:count * every].reshape(count, every).all(axis=1)), every
+    words = "the arm runs away in a window"
+    raise InputRejected("D17", words, where=log.name, remedy="look at its inertia")

@@ -4,7 +4,6 @@
     pd+feedforward   the same, and parts of the model's torque on the reference       eq. (24)
     computed-torque  τ = D(q̄) r + c(q̄, dq̄) + h(q̄) + τ_f(dq_r)                       eq. (25)-(27)
                      r = -Kp ē - Kd dē - Ki ∫e + v
-    open-loop        the logged torque on the joints it drives; pd holds the others
 
 e = q - q_r. ē and dē come from the observer, eq. (20)-(21), which filters e and starts with zero
 error, or are e itself and its backward difference. q̄ = q_r + ē and dq̄ are the observer's wherever
@@ -66,7 +65,7 @@ class Feedback:
 
     def __init__(self, experiment: Experiment, joint: int | None = None) -> None:
         """Take the gains of `joint` (from 0), or of all joints as columns."""
-        law = experiment.controller
+        law, time = experiment.controller, experiment.sample_time
 
         def own(values: Array | None) -> Any:
             if values is None:
@@ -75,13 +74,12 @@ class Feedback:
 
         self.functions: Functions = ARRAYS if joint is None else NUMBERS
         self.kp, self.kd, self.ki = own(law.kp), own(law.kd), own(law.ki)
-        self.integrating = bool(np.any(self.ki))
-        self.sample_time, self.integral = experiment.sample_time, 0.0
-        self.gain, self.estimate = None, _backward_difference(experiment.sample_time)
+        self.sample_time, self.integral = time, 0.0
+        self.gain, self.estimate = None, _backward_difference(time)
         if law.observer_gain is not None:
             self.gain = tuple(own(column) for column in law.observer_gain.T)
-        if law.velocity == "observer" and self.gain is not None:
-            self.estimate = _observer(self.gain, experiment.sample_time)
+            if law.velocity == "observer":
+                self.estimate = _observer(self.gain, time)
         self.seen: tuple[Any, Any] = (0.0, 0.0)  # the last estimate
         self.counts = _counter(own(experiment.resolution), self.functions)
         self.steps = _counter(own(law.torque_resolution), self.functions)
@@ -91,11 +89,8 @@ class Feedback:
     def __call__(self, error: Any, ahead: Any) -> Any:
         """Return -Kp ē - Kd dē - Ki ∫e and what is `ahead` [N m]."""
         position, speed = self.seen = self.estimate(error)
-        torque = ahead - self.kp * position - self.kd * speed
-        if self.integrating:
-            self.integral = self.integral + self.sample_time * error
-            torque = torque - self.ki * self.integral
-        return torque
+        self.integral = self.integral + self.sample_time * error
+        return ahead - self.kp * position - self.kd * speed - self.ki * self.integral
 
     def limited(self, torque: Any) -> Any:
         """Return a torque after the controller's own steps and limit, as the log has it."""
@@ -153,7 +148,7 @@ class Controlling:
         return torque.T
 
     def _fed_back(self, k: int, q: Array) -> tuple[Array, Array, Array]:
-        """Return what a model is linearised about, errors of position and speed, and feedback."""
+        """Return errors of position and speed about which a model acts, and the feedback."""
         error = q - self._experiment.q_ref[k][:, None]
         v: Any = 0.0 if self._experiment.v is None else self._experiment.v[k]
         feedback = self._feedback(error, v[:, None] if np.ndim(v) == 1 else v)
@@ -164,10 +159,7 @@ class Controlling:
         experiment, model = self._experiment, self._experiment.feedforward_arm
         ahead = 0.0 if self._ahead is None else np.atleast_2d(self._ahead[k]).T
         if experiment.controller.law != "computed-torque":
-            torque = feedback + ahead
-            if experiment.driven is not None and experiment.tau is not None:
-                torque[experiment.driven] = np.atleast_2d(experiment.tau[k, experiment.driven]).T
-            return np.asarray(torque)
+            return np.asarray(feedback + ahead)
         assert model is not None  # Experiment.of_log refuses the law without
         q, dq = experiment.q_ref[k] + e.T, experiment.dq_ref[k] + de.T
         if self._rigid == _RIGID:

@@ -29,14 +29,14 @@ class Course:
     position_difference: Array  # simulated minus measured
     speed: Array  # [rad/s] reconstructed
     speed_simulated: Array
-    torque: Array | None  # [N m] commanded
-    torque_simulated: Array | None
-    torque_difference: Array | None
-    frequency: Array | None  # [Hz] (bins,) of the spectra; None for windows, which begin anew
-    position_density: Array | None  # [rad²/Hz] (bins, joints) of the difference
-    torque_density: Array | None  # [N² m²/Hz]
-    elapsed: Array | None  # [s] since a window began
-    drift: Array | None  # [rad] rms of the position's difference by then (points, joints)
+    torque: Array | None = None  # [N m] commanded
+    torque_simulated: Array | None = None
+    torque_difference: Array | None = None
+    frequency: Array | None = None  # [Hz] (bins,) of the spectra; None for windows
+    position_density: Array | None = None  # [rad²/Hz] (bins, joints) of the difference
+    torque_density: Array | None = None  # [N² m²/Hz]
+    elapsed: Array | None = None  # [s] since a window began
+    drift: Array | None = None  # [rad] rms of the position's difference by then (points, joints)
 
 
 def course(
@@ -47,53 +47,30 @@ def course(
     first = np.arange(0, log.n_samples, size)
     middle = np.minimum(first + size // 2, log.n_samples - 1)
     t = np.stack([log.t[first], log.t[middle]], axis=1).ravel()
-    off, time = q[1] - q[0], log.sample_time
-    measured, simulated, difference, speed, moved = (_envelope(x, size) for x in (*q, off, *dq))
-    torque = applied = missing = None
-    frequency = density = torque_density = elapsed = drift = None
-    if windows is None:
-        frequency, density = _spectrum(off, time)
+    off, more = q[1] - q[0], dict[str, Array | None]()
+    if windows is not None:
+        rows = windows.first[:, None] + np.arange(windows.length)
+        more["elapsed"] = log.sample_time * np.arange(windows.length, dtype=np.float64)
+        more["drift"] = np.sqrt(np.mean(off[rows] ** 2, axis=0))
     else:
-        elapsed, drift = _drift(off, windows, time)
+        more["frequency"], more["position_density"] = _spectrum(off, log.sample_time)
     if tau is not None:
         missed = tau[1] - tau[0]
-        torque, applied, missing = (_envelope(x, size) for x in (*tau, missed))
-        torque_density = None if frequency is None else _spectrum(missed, time)[1]
-    return Course(
-        t,
-        measured,
-        simulated,
-        difference,
-        speed,
-        moved,
-        torque,
-        applied,
-        missing,
-        frequency,
-        density,
-        torque_density,
-        elapsed,
-        drift,
-    )
+        names = ("torque", "torque_simulated", "torque_difference")
+        more |= {name: _envelope(x, size) for name, x in zip(names, (*tau, missed), strict=True)}
+        if windows is None:
+            more["torque_density"] = _spectrum(missed, log.sample_time)[1]
+    return Course(t, *(_envelope(x, size) for x in (*q, off, *dq)), **more)
 
 
 def _spectrum(x: Array, sample_time: float) -> tuple[Array, Array] | tuple[None, None]:
     """Density of the longest stretch without a gap."""
     known = np.isfinite(x).all(axis=1)
-    edges = np.flatnonzero(
-        np.diff(np.concatenate([[False], known, [False]]).astype(np.int8))
-    ).reshape(-1, 2)
+    edges = np.flatnonzero(np.diff(known, prepend=False, append=False)).reshape(-1, 2)
     start, stop = max(edges.tolist(), key=lambda edge: edge[1] - edge[0], default=(0, 0))
     if stop - start < SIMULATION.fewest:
         return None, None
     return welch(x[start:stop], 1.0 / sample_time, SIMULATION.segment)
-
-
-def _drift(off: Array, windows: Windows, sample_time: float) -> tuple[Array, Array]:
-    rows = windows.first[:, None] + np.arange(windows.length)
-    return sample_time * np.arange(windows.length, dtype=np.float64), np.sqrt(
-        np.mean(off[rows] ** 2, axis=0)
-    )
 
 
 def _envelope(x: Array, size: int) -> Array:

@@ -30,8 +30,13 @@ __all__ = ["FAULT", "example_arm", "example_session"]
 # what is wrong with the arm, unless it is said otherwise
 FAULT: Final = "cogging:2:order=18,amplitude=0.4"
 _FRICTION: Final = (
-    "coulomb:1:level=3", "coulomb:2:level=1.5", "coulomb:3:level=0.4", "viscous:1:coefficient=1.5",
-    "viscous:2:coefficient=0.9", "viscous:3:coefficient=0.15")
+    "coulomb:1:level=3",
+    "coulomb:2:level=1.5",
+    "coulomb:3:level=0.4",
+    "viscous:1:coefficient=1.5",
+    "viscous:2:coefficient=0.9",
+    "viscous:3:coefficient=0.15",
+)
 
 
 def example_arm(*faults: str) -> Arm:
@@ -61,14 +66,24 @@ def _planned(arm: Arm, number: int, role: str, rng: np.random.Generator) -> Expe
     t = time * np.arange(round(EXAMPLE.period / time) + 1, dtype=np.float64)
     q, dq, ddq = np.transpose(_series(rng).at(t), (0, 2, 1))
     values = {"t": t, "q_ref": q, "dq_ref": dq, "ddq_ref": ddq}
-    signals = {name: Signal(x, schema.unit_of(name), schema.SIGNALS[name][1])
-               for name, x in values.items()}
+    signals = {
+        name: Signal(x, schema.unit_of(name), schema.SIGNALS[name][1]) for name, x in values.items()
+    }
     gains = np.array(EXAMPLE.kp), np.array(EXAMPLE.kd)
     observer = np.tile(EXAMPLE.observer_gain, (arm.n_joints, 1))
     controller = Controller("pd", *gains, velocity="observer", observer_gain=observer)
     name, robot = f"excitation-{number + 1}", format_robot(arm.robot)
-    return ExperimentLog(name, "excitation", role, "planned", arm.robot.name, time,
-                         robot_text=robot, signals=signals, controller=controller)
+    return ExperimentLog(
+        name,
+        "excitation",
+        role,
+        "planned",
+        arm.robot.name,
+        time,
+        robot_text=robot,
+        signals=signals,
+        controller=controller,
+    )
 
 
 def _series(rng: np.random.Generator) -> FourierSeries:

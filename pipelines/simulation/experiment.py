@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.dynamics.arm import Arm
 from pipelines.errors import InputRejected
@@ -18,10 +17,9 @@ __all__ = ["Experiment"]
 _WHERE = "the log can still be simulated in short windows: --windowed"
 # Without these a law cannot be followed.
 _NEEDED = {
-    "pd": ("kp", "kd"),
-    "pd+feedforward": ("kp", "kd", "feedforward"),
-    "computed-torque": ("kp", "kd", "model"),
-    "open-loop": (),
+    "pd": ("kp", "kd", "velocity"),
+    "pd+feedforward": ("kp", "kd", "feedforward", "velocity"),
+    "computed-torque": ("kp", "kd", "model", "velocity"),
 }
 
 
@@ -40,8 +38,6 @@ class Experiment:
     tau0: Array  # [N m] (n,) what a controller with delay has commanded before the first sample
     resolution: Array  # [rad] (n,) of the encoders; 0 where they do not quantise
     v: Array | None = None  # (N, n) injected excitation, or (N, n, replicas) where each has its own
-    tau: Array | None = None  # [N m] (N, n) torque of the joints that are driven open loop
-    driven: npt.NDArray[np.bool_] | None = None  # (n,) which joints are
     feedforward_arm: Arm | None = None  # the model that the controller used
 
     @property
@@ -61,7 +57,7 @@ class Experiment:
     def part(self, first: int, samples: int) -> Experiment:
         """Return `samples` of it from `first` on, started on the reference."""
         rows = slice(first, first + samples)
-        names = ("q_ref", "dq_ref", "ddq_ref", "v", "tau")
+        names = ("q_ref", "dq_ref", "ddq_ref", "v")
         cut = {name: getattr(self, name)[rows] for name in names if getattr(self, name) is not None}
         start = {} if first == 0 else {"q0": self.q_ref[first], "dq0": self.dq_ref[first]}
         return replace(self, start_time=self.start_time + first * self.sample_time, **cut, **start)
@@ -71,128 +67,74 @@ class Experiment:
         """Return the experiment that `log` recorded, or plans.
 
         Raises:
-            InputRejected: S22, the log does not say what its controller did; T05, its clock is
-                uneven; S22, D02, a signal of it is missing or has gaps.
+            InputRejected: S22, the log does not say what its controller did, or had none; T05, its
+                clock is uneven; S22, D02, a signal of it is missing or has gaps.
         """
-        controller = _controller(log)
-        if log.n_samples < 2 or _jitter(log) > SIMULATION.uneven:  # noqa: PLR2004
+        controller, where = _controller(log), log.source or log.name
+        uneven = log.n_samples < 2  # noqa: PLR2004
+        if uneven or np.abs(np.diff(log.t) / log.sample_time - 1.0).max() > SIMULATION.uneven:
             words = "a controller runs at an even rate, and this log has gaps or an uneven clock"
             remedy = f"cut the log at its gaps, or resample it with 'rrrid import'; {_WHERE}"
-            raise InputRejected("T05", words, where=_place(log), remedy=remedy)
+            raise InputRejected("T05", words, where=where, remedy=remedy)
         model = None
-        if controller.model is not None and controller.law in ("pd+feedforward", "computed-torque"):
-            stored = parse_model(controller.model, where=_place(log))
-            model = Arm.from_model(stored, where=_place(log))
-        driven, tau = _driven(log, controller)
-        references = _references(log, driven)
+        if controller.model is not None and controller.law != "pd":
+            model = Arm.from_model(parse_model(controller.model, where=where), where=where)
+        q_ref = _whole(log, "q_ref")
+        given = "dq_ref" in log
+        dq_ref = _whole(log, "dq_ref") if given else np.gradient(q_ref, log.sample_time, axis=0)
+        ddq_ref = np.zeros_like(q_ref)  # nothing asks for it
+        if "ddq_ref" in log or controller.feedforward:
+            ddq_ref = _whole(log, "ddq_ref")
+        resolution = np.array([joint.encoder_resolution or 0.0 for joint in log.robot.joints])
+        # the start of the reference, or where the encoders see an arm that is elsewhere
+        q0 = q_ref[0]
+        if "q" in log and np.isfinite(log.q[0]).all():
+            q0 = np.where(np.abs(log.q[0] - q0) <= resolution, q0, log.q[0])
         started = "tau" in log and bool(np.isfinite(log.tau[0]).all())
-        tau0 = log.tau[0] if started else np.zeros(log.n_joints)
-        v = _whole(log, "v") if "v" in log else None
         return cls(
             log.sample_time,
             float(log.t[0]),
             controller,
-            *references,
-            *_start(log, references),
-            tau0,
-            _resolution(log),
-            v,
-            tau,
-            driven,
+            q_ref,
+            dq_ref,
+            ddq_ref,
+            q0,
+            dq_ref[0],
+            log.tau[0] if started else np.zeros(log.n_joints),
+            resolution,
+            _whole(log, "v") if "v" in log else None,
             model,
         )
 
 
-def _place(log: ExperimentLog) -> str:
-    return log.source or log.name
-
-
-def _jitter(log: ExperimentLog) -> float:
-    """Return the largest deviation of an interval, in samples."""
-    return float(np.abs(np.diff(log.t) - log.sample_time).max()) / log.sample_time
-
-
-def _resolution(log: ExperimentLog) -> Array:
-    return np.array([joint.encoder_resolution or 0.0 for joint in log.robot.joints])
-
-
 def _controller(log: ExperimentLog) -> Controller:
     """Return the log's controller; S22 where it cannot be followed."""
-    given = log.controller
+    given, where = log.controller, log.source or log.name
     if given is None or given.law == "unknown":
-        raise InputRejected(
-            "S22", "the log does not say how its controller works", where=_place(log), remedy=_WHERE
-        )
+        words = "the log does not say how its controller works"
+        raise InputRejected("S22", words, where=where, remedy=_WHERE)
+    if given.law == "open-loop":
+        words = "an experiment in open loop has no controller to follow"
+        raise InputRejected("S22", words, where=where, remedy=_WHERE)
     missing = [key for key in _NEEDED[given.law] if getattr(given, key) is None]
     if given.law == "pd+feedforward" and given.feedforward and given.model is None:
         missing.append("model")
-    if given.law != "open-loop" and given.velocity is None:
-        missing.append("velocity")
     if given.velocity == "observer" and given.observer_gain is None:
         missing.append("observer_gain")
     if missing:
         words = f"the controller, {given.law}, lacks {', '.join(missing)}"
         remedy = f"write them into the log's controller group; {_WHERE}"
-        raise InputRejected("S22", words, where=_place(log), remedy=remedy)
+        raise InputRejected("S22", words, where=where, remedy=remedy)
     return given
 
 
 def _whole(log: ExperimentLog, name: str) -> Array:
     """Return a signal without gaps."""
+    where = log.source or log.name
     if name not in log:
         words = f"without the signal {name} nothing says what the controller followed"
-        raise InputRejected("S22", words, where=_place(log), remedy=f"log it; {_WHERE}")
+        raise InputRejected("S22", words, where=where, remedy=f"log it; {_WHERE}")
     if not np.isfinite(log[name]).all():
         words = f"the signal {name} has missing samples"
-        raise InputRejected("D02", words, where=_place(log), remedy="cut the log there")
+        raise InputRejected("D02", words, where=where, remedy="cut the log there")
     return log[name]
-
-
-def _driven(
-    log: ExperimentLog, controller: Controller
-) -> tuple[npt.NDArray[np.bool_] | None, Array | None]:
-    """Return which joints the logged torque drives, and that torque.
-
-    In an open-loop log that is its moving joint, or all where no joint is named.
-    """
-    if controller.law != "open-loop":
-        return None, None
-    driven = np.ones(log.n_joints, dtype=bool)
-    if log.joint is not None:
-        driven = np.arange(1, log.n_joints + 1) == log.joint
-    known = (controller.kp, controller.kd, controller.velocity)
-    if not driven.all() and any(one is None for one in known):
-        words = (
-            f"joint {log.joint} is driven open loop, but the log does not say how the others "
-            "are held"
-        )
-        remedy = f"give their kp, kd and velocity in the controller group; {_WHERE}"
-        raise InputRejected("S22", words, where=_place(log), remedy=remedy)
-    return driven, _whole(log, "tau")
-
-
-def _references(
-    log: ExperimentLog, driven: npt.NDArray[np.bool_] | None
-) -> tuple[Array, Array, Array]:
-    """Return q_ref, dq_ref, ddq_ref; a joint that is held without one stays where it starts."""
-    if driven is not None and "q_ref" not in log:
-        start = np.where(np.isfinite(log.q[0]), log.q[0], 0.0)
-        return np.tile(start, (log.n_samples, 1)), np.zeros(log.q.shape), np.zeros(log.q.shape)
-    q_ref = _whole(log, "q_ref")
-    if "dq_ref" in log:
-        dq_ref = _whole(log, "dq_ref")
-    else:
-        dq_ref = np.gradient(q_ref, log.sample_time, axis=0)
-    feedforward = log.controller is not None and bool(log.controller.feedforward)
-    if "ddq_ref" in log or feedforward:
-        return q_ref, dq_ref, _whole(log, "ddq_ref")
-    return q_ref, dq_ref, np.zeros_like(q_ref)  # nothing asks for it
-
-
-def _start(log: ExperimentLog, references: tuple[Array, Array, Array]) -> tuple[Array, Array]:
-    """Return where the reference starts, or where the encoders see an arm that is elsewhere."""
-    q_ref, dq_ref, _ = references
-    if "q" not in log or not np.isfinite(log.q[0]).all():
-        return q_ref[0], dq_ref[0]
-    near = np.abs(log.q[0] - q_ref[0]) <= _resolution(log)
-    return np.where(near, q_ref[0], log.q[0]), dq_ref[0]

@@ -60,15 +60,9 @@ class Plant:
             if any((own.load, own.actuator, own.drive, own.sensor, own.settled, own.states)):
                 hooks.append(_alone(effect, values, own))
         gathered = tuple(SpeedCurve.total(each, [1.0] * len(each)) for each in curves)
-        return cls(
-            acting_on.body,
-            acting_on.p,
-            added,
-            gathered,
-            tuple(hooks),
-            arm.nominal.torque,
-            tuple(records),
-        )
+        needed = arm.nominal.torque
+        body, p = acting_on.body, acting_on.p
+        return cls(body, p, added, gathered, tuple(hooks), needed, tuple(records))
 
     @property
     def n_joints(self) -> int:
@@ -91,13 +85,10 @@ class Plant:
         worst = int(np.argmin(values[:, 0] / values[:, -1]))
         if values[worst, 0] <= SIMULATION.singular * values[worst, -1]:
             where = ", ".join(f"{x:.3g}" for x in q[worst])
-            raise InputRejected(
-                "D15",
-                f"at q = ({where}) the model's inertia matrix is not positive definite, its "
-                f"smallest eigenvalue {values[worst, 0]:.2g}",
-                remedy="such an arm cannot be simulated: fit it to richer motion, or add the "
-                "rotors' inertia",
-            )
+            words = f"at q = ({where}) the model's inertia matrix is not positive definite, its "
+            words += f"smallest eigenvalue {values[worst, 0]:.2g}"
+            remedy = "such an arm cannot be simulated: fit it to richer motion, or add the rotors' "
+            raise InputRejected("D15", words, remedy=remedy + "inertia")
 
     def prepared(self, replicas: int) -> MovingPlant:
         return MovingPlant(self, replicas)
@@ -122,11 +113,9 @@ def refuse_runaway(state: Array, k: int, sample_time: float) -> None:
     here = np.abs(state) <= SIMULATION.runaway  # what is not a number is no motion either
     if not here.all():
         joint = int(np.argmax(~here.all(axis=1))) % (len(state) // 2) + 1
-        raise InputRejected(
-            "D17",
-            f"the simulated arm runs away: joint {joint}, after {k * sample_time:.3g} s",
-            remedy="check the model's inertia and friction, and the gains that the log gives",
-        )
+        words = f"the simulated arm runs away: joint {joint}, after {k * sample_time:.3g} s"
+        remedy = "check the model's inertia and friction, and the gains that the log gives"
+        raise InputRejected("D17", words, remedy=remedy)
 
 
 class MovingPlant:
@@ -142,14 +131,14 @@ class MovingPlant:
         for joint, curve in enumerate(plant.curves):
             sigmoids[:, : len(curve.heights), joint, 0] = curve.heights, curve.sharpnesses
         self._heights, self._sharpnesses = sigmoids
-        ends = np.cumsum([0, *(hook.states for hook in plant.hooks)]).tolist()
-        self.n_states = ends[-1]
-        self._hooked = [
-            (hook, slice(a, b)) for hook, a, b in zip(plant.hooks, ends, ends[1:], strict=False)
-        ]
+        self.n_states, self._hooked = 0, []
+        for hook in plant.hooks:
+            own = slice(self.n_states, self.n_states + hook.states)
+            self._hooked.append((hook, own))
+            self.n_states = own.stop
         self._zeros = np.zeros((replicas, plant.n_joints))
 
-    def motion(self, t: Array, q: Array, dq: Array, ddq: Array | None = None) -> Motion:
+    def _motion(self, t: Array, q: Array, dq: Array, ddq: Array | None = None) -> Motion:
         """Return the state as effects see it, (replicas, joints)."""
         return Motion(t, q.T, dq.T, self._zeros if ddq is None else ddq.T)
 
@@ -182,7 +171,7 @@ class MovingPlant:
         Each effect acts around those before it: a command meets the last one first.
         """
         rates, torque = np.zeros_like(states), command.copy()
-        motion = self.motion(t, q, dq)
+        motion = self._motion(t, q, dq)
         for hook, own in reversed(self._hooked):
             if hook.rate is not None:
                 rates[:, own] = hook.rate(motion, torque.T, states[:, own])
@@ -204,29 +193,30 @@ class MovingPlant:
         """Return the states (replicas, states) after a control sample was taken."""
         if not self.n_states:
             return states
-        out, motion, torque = states.copy(), self.motion(t, q, dq), command.copy()
+        out, motion, torque = states.copy(), self._motion(t, q, dq), command.copy()
         for hook, own in reversed(self._hooked):
             if hook.update:
                 out[:, own] = hook.update(motion, torque.T, states[:, own])
             torque = _driven(hook, own, motion, dq, states, torque)
         return out
 
-    def settled(self, t: Array, q: Array, dq: Array, ddq: Array | None = None) -> Array:
-        """Return the true state (2 joints, replicas) when the encoders first tell q, dq, ddq."""
-        motion = self.motion(t, q, dq, ddq)
+    def begin(
+        self, t: Array, q: Array, dq: Array, ddq: Array | None = None, since: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Return the true state (2 joints, replicas) when the encoders first tell q, dq, ddq.
+
+        And the states (replicas, states) then, of memories that count from `since` on, or from t.
+        """
+        motion = self._motion(t, q, dq, ddq)
         for hook, _ in reversed(self._hooked):
             if hook.settled:
                 motion = hook.settled(motion, self.plant.needed(motion))
-        return np.concatenate([motion.q.T, motion.dq.T])
-
-    def at_start(self, t: Array, q: Array, dq: Array, ddq: Array | None = None) -> Array:
-        """Return the states (replicas, states) before the first sample."""
-        states = np.zeros((self.replicas, self.n_states))
-        motion = self.motion(t, q, dq, ddq)
+        state, states = np.vstack([motion.q.T, motion.dq.T]), np.zeros((len(t), self.n_states))
+        begun = self._motion(t if since is None else since, motion.q.T, motion.dq.T, ddq)
         for hook, own in self._hooked:
             if hook.start:
-                states[:, own] = hook.start(motion, self.plant.needed(motion))
-        return states
+                states[:, own] = hook.start(begun, self.plant.needed(begun))
+        return np.ascontiguousarray(state), states
 
     def measured(self, q: Array, states: Array) -> Array:
         """Return what the encoders see of q (joints, replicas), before they count it."""

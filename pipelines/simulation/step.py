@@ -12,10 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.dynamics.arm import Arm
 from pipelines.errors import InputRejected
@@ -34,7 +32,6 @@ class Step:
 
     per_sample: int
     error: Array  # [rad] rms, largest of the stretches, measured by halving
-    noise: Array  # [rad] rms difference of two runs with different noise
     allowed: Array  # [rad]
     exact: bool  # the rigid body is nowhere held
 
@@ -69,57 +66,45 @@ def choose_step(plant: Plant, experiment: Experiment, noise: Noise | None = None
     """
     plant.refuse_unphysical(experiment.q_ref[:1])
     stretches = _stretches(experiment)
-    random = _noise_difference(plant, stretches[:2], noise or Noise.none(experiment.n_joints))
+    random = np.zeros(experiment.n_joints)
+    if noise is not None and (noise.torque.any() or noise.position.any()):
+        runs = run_together(plant, stretches[:2], SIMULATION.ample, noise, (1, 2), exact=False)
+        random = _rms([one.true_q[0] for one in runs], [one.true_q[1] for one in runs])
     counted = experiment.resolution / np.sqrt(6.0)  # of the difference of two unrelated counts
     allowed = np.maximum(SIMULATION.share * np.maximum(random, counted), SIMULATION.unheard)
-    calm = [_without_steps(stretch) for stretch in stretches]
-    coarse: list[Array] | None = None
+    ideal = np.zeros(experiment.n_joints)
+    smooth = replace(experiment.controller, torque_resolution=None)
+    calm = [replace(stretch, controller=smooth, resolution=ideal) for stretch in stretches]
+    error, coarse = np.full_like(allowed, np.inf), None
     for steps in SIMULATION.steps:
         fine = _positions(plant, calm, 2 * steps)
-        error = _rms(_positions(plant, calm, steps, exact=False), fine)
-        if (error <= allowed).all():
-            return Step(steps, error, random, allowed, exact=False)
-        error = _rms(_positions(plant, calm, steps) if coarse is None else coarse, fine)
-        if (error <= allowed).all():
-            return Step(steps, error, random, allowed, exact=True)
+        for exact in (False, True):
+            rough = coarse if exact else None
+            error = _rms(rough or _positions(plant, calm, steps, exact), fine)
+            if (error <= allowed).all():
+                return Step(steps, error, allowed, exact)
         coarse = fine
-    raise InputRejected(
-        "D17",
-        f"with {SIMULATION.steps[-1]} steps a sample the simulation still is "
-        f"{float(error.max()):.2g} rad off",
-        remedy="friction that changes sign within a very small speed needs a lower sharpness",
-    )
+    words = f"with {steps} steps a sample the simulation still is {error.max():.2g} rad off"
+    remedy = "friction that changes sign within a very small speed needs a lower sharpness"
+    raise InputRejected("D17", words, remedy=remedy)
 
 
 def _stretches(experiment: Experiment) -> list[Experiment]:
     """Return parts of it that are the hardest to follow.
 
     They lie where the arm starts, where joints reverse most often and friction turns over, and
-    where they are fastest, accelerate hardest, or are driven hardest.
+    where they are fastest or accelerate hardest.
     """
     length = max(2, round(SIMULATION.stretch / experiment.sample_time))
     length = min(experiment.n_samples, length)
     speed = experiment.dq_ref
-    activities: list[npt.NDArray[Any]] = [
-        np.diff(np.signbit(speed), axis=0) != 0,
-        speed[1:] ** 2,
-        np.diff(speed, axis=0) ** 2,
-    ]
-    if experiment.tau is not None:
-        activities.append(experiment.tau[1:] ** 2)
+    reversals = np.diff(np.signbit(speed), axis=0).astype(float)
     starts = [0]
-    for activity in activities:
+    for activity in (reversals, speed[1:] ** 2, np.diff(speed, axis=0) ** 2):
         share = activity / np.maximum(activity.sum(axis=0), 1e-300)  # numerics: of each joint's
         moved = np.convolve(share.sum(axis=1), np.ones(length - 1), mode="valid")
         starts.append(int(np.argmax(moved)))
     return [experiment.part(first, length) for first in dict.fromkeys(starts)]
-
-
-def _without_steps(experiment: Experiment) -> Experiment:
-    """Return the same with ideal encoders and commands of any fineness."""
-    controller = replace(experiment.controller, torque_resolution=None)
-    ideal = np.zeros(experiment.n_joints)
-    return replace(experiment, controller=controller, resolution=ideal)
 
 
 def _positions(
@@ -133,15 +118,6 @@ def _positions(
             if len(stretches) == 1:
                 return [np.full(stretches[0].q_ref.shape, np.nan)]
     return [q for stretch in stretches for q in _positions(plant, [stretch], steps, exact)]
-
-
-def _noise_difference(plant: Plant, stretches: list[Experiment], noise: Noise) -> Array:
-    """Return the rms difference [rad] (joints,) of two runs with different noise."""
-    if not (noise.torque.any() or noise.position.any()):
-        return np.zeros(len(noise.torque))
-    runs = run_together(plant, stretches, SIMULATION.ample, noise, (1, 2), exact=False)
-    both = [one.true_q for one in runs]
-    return _rms([some for some, _ in both], [other for _, other in both])
 
 
 def _rms(some: list[Array], others: list[Array]) -> Array:
