@@ -26,10 +26,8 @@ import numpy as np
 import pinocchio as pin
 
 from benchmarks.regressor import rrr
-from pipelines.dynamics.kinematics import serial_chain
 from pipelines.dynamics.rrr_kinematics import BRANCHES, Geometry, inverse, rrr_geometry, tip
 from pipelines.io.log import Array
-from pipelines.writing.inverse_kinematics import ClosedForm, Numerical
 from pipelines.writing.task import writing_task
 
 _TOOLBOX_SAMPLES = 1000  # it takes about as long for one sample as the closed form for all
@@ -105,14 +103,9 @@ def main() -> None:
         return np.asarray(np.unwrap(inverse(geometry, tips).q[branch], axis=0))
 
     def motion() -> object:
-        return ClosedForm(geometry).motion(tips, wanted.velocity, wanted.acceleration)
+        return task.motion(t, wanted)
 
     q = closed()
-    numerical = Numerical(serial_chain(robot), q[0] + 0.05)
-
-    def general() -> object:
-        return numerical.motion(tips, wanted.velocity, wanted.acceleration)
-
     def theirs() -> np.ndarray:
         return newton(model, tips, q[0], behind)
 
@@ -126,9 +119,6 @@ def main() -> None:
     print(f"'{arguments.text}', {len(t)} samples, {task.duration:.1f} s\n{HEADER}")
     print(line("q, against Newton on Pinocchio", closed, q, theirs), flush=True)
     print(line("q, dq, ddq, against its q alone", motion, q, theirs), flush=True)
-    answer = general()
-    assert isinstance(answer, tuple)
-    print(line("any serial arm: q, dq, ddq", general, answer[0], theirs), flush=True)
     if arguments.toolbox:
         few, few_q = tips[:_TOOLBOX_SAMPLES], q[:_TOOLBOX_SAMPLES]
         name = f"{len(few)} samples, Robotics Toolbox"

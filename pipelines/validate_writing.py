@@ -18,7 +18,6 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.dynamics.arm import Arm, ArmTorque
-from pipelines.dynamics.body import Motion
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
 from pipelines.estimation.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.estimation.result import torques
@@ -26,7 +25,7 @@ from pipelines.friction.in_folder import fitted_in_folder
 from pipelines.importers.recipe import Recipe
 from pipelines.importers.units import controller_table, write_controller_table
 from pipelines.io.files import write_log
-from pipelines.io.log import Array, ExperimentLog, derive, digest_of, recording
+from pipelines.io.log import ExperimentLog, derive, digest_of, recording
 from pipelines.io.model_file import ModelFile, read_model
 from pipelines.io.option import option
 from pipelines.io.robot import RobotDescription
@@ -42,7 +41,6 @@ from pipelines.writing.path import Page
 from pipelines.writing.task import designed, planned_log, writing_task
 from pipelines.writing.timing import Pace
 from pipelines.writing.validation import Gates, Result
-from pipelines.writing.via_points import via_points
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
@@ -54,10 +52,11 @@ class Settings:
     model: str | None = option(None, "model.json to judge. [the folder's, else fitted to its logs]")
     torque_gate: float = option(0.1, "Largest relative torque error of a joint.")
     draws: int = option(5, "Models that simulated control cases run on in turn.")
-    seed: int = option(1, "Seed of those, and of via points.")
+    seed: int = option(1, "Seed of those.")
     simulate: bool = option(True, "Judge by what was recorded alone.", "--no-simulation")
     text: str | None = option(
-        None, "Design this writing task instead: trajectory.h5 for the robot.")
+        None, "Design this writing task instead: trajectory.h5 for the robot."
+    )
     plane_y: float = option(Page.y, "Plane of the letters, y [m].")
     x: float = option(Page.x, "Middle of the text, x [m].")
     z: float = option(Page.z, "Middle of the text, z [m].")
@@ -67,16 +66,14 @@ class Settings:
     slow: float = option(Pace.slow, "In slow phases, from a line into an arc [m/s].")
     acceleration: float = option(Pace.acceleration, "Largest acceleration of the tip [m/s^2].")
     elbow: str | None = option(None, "up or down, of the RRR arm. [up]")
-    posture: tuple[float, ...] | None = option(
-        None, "Posture near the task [rad], of any other arm.")
-    via_points: int | None = option(None, "Design so many moves between random postures instead.")
     sample_time: float = 1e-3  # [s] of the designed task
     recipe: str | None = option(
-        None, "Recipe of import: controller.csv in its order, units and rate.")
+        None, "Recipe of import: controller.csv in its order, units and rate."
+    )
 
     @property
     def designs(self) -> bool:
-        return self.text is not None or self.via_points is not None
+        return self.text is not None
 
 
 @dataclass(frozen=True)
@@ -97,8 +94,12 @@ def read(request: Request, settings: Settings) -> Inputs:
         UsageError: C02, neither logs nor a task; C04, no such file.
     """
     if not (request.paths or request.roles or settings.designs):
-        raise UsageError("C02", "no logs, and no text to write", where="validate-writing",
-                         remedy="name logs to validate on, or design the task with --text RRR")
+        raise UsageError(
+            "C02",
+            "no logs, and no text to write",
+            where="validate-writing",
+            remedy="name logs to validate on, or design the task with --text RRR",
+        )
     read_any = request.paths or request.roles
     inputs = read_logs(request, settings) if read_any else Inputs()
     found = settings.model if settings.model is not None else _left_in(request.paths)
@@ -119,10 +120,15 @@ def read(request: Request, settings: Settings) -> Inputs:
             path = find_recipe(settings.recipe)
             recipe = parse_recipe(read_small_text(path, what="a recipe (TOML)"), path)
             sources.append(path)
-    label = inputs.label or (f"writing-{slug(settings.text)}" if settings.text else "via-points")
+    label = inputs.label or f"writing-{slug(settings.text or '')}"
     material = Material(model, said, settings.model is not None, robot, recipe)
-    return replace(inputs, sources=(*inputs.sources, *sources), material=material, label=label,
-                   robot_name=robot.name if robot is not None else inputs.robot_name)
+    return replace(
+        inputs,
+        sources=(*inputs.sources, *sources),
+        material=material,
+        label=label,
+        robot_name=robot.name if robot is not None else inputs.robot_name,
+    )
 
 
 def _left_in(paths: Sequence[Path]) -> str | None:
@@ -164,29 +170,48 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     judges = [log for log in logs if log.role == "validate"]
     if not judges:
         kinds = ", ".join(sorted({f"{log.experiment} ({log.role})" for log in logs})) or "none"
-        raise NothingMatched("C06", f"no log of role validate; there are: {kinds}",
-                             where=inputs.label, remedy="record the writing task with role "
-                             "validate; --text RRR designs it")
+        raise NothingMatched(
+            "C06",
+            f"no log of role validate; there are: {kinds}",
+            where=inputs.label,
+            remedy="record the writing task with role validate; --text RRR designs it",
+        )
     arm, said = _model(inputs, logs, judges)
     pairs, checks = _examined(sorted(judges, key=lambda log: log.experiment != "writing"))
     parts = [torques(arm, log, motion) for log, motion in pairs]
     found = tuple(
         validation.torque_validation(log, motion, arm, own, place < CONFIG.drawn_logs)
-        for place, ((log, motion), own) in enumerate(zip(pairs, parts, strict=True)))
+        for place, ((log, motion), own) in enumerate(zip(pairs, parts, strict=True))
+    )
     torque = validation.pooled(found)
     cases, left_out, apart = validation.control_cases(
-        pairs, parts, arm, settings.simulate, settings.draws, settings.seed)
+        pairs, parts, arm, settings.simulate, settings.draws, settings.seed
+    )
     simulated, not_simulated = None, "it was not asked for"
     if settings.simulate:
         simulated, not_simulated = validation.simulated_task(pairs, arm)
     gates, failed = validation.gates_of(torque, cases, settings.torque_gate, arm.robot.name)
-    derived = tuple(_derived(log, motion, own, settings)
-                    for (log, motion), own in zip(pairs, parts, strict=True))
+    derived = tuple(
+        _derived(log, motion, own, settings)
+        for (log, motion), own in zip(pairs, parts, strict=True)
+    )
     return Result(
-        robot=arm.robot.name, joints=tuple(joint.name for joint in arm.robot.joints), model=said,
-        torque=torque, gates=gates, logs=found, cases=cases, cases_left_out=left_out,
-        cases_apart=apart, drawn=_drawn_from(arm), draws=settings.draws, simulation=simulated,
-        simulation_left_out=not_simulated, data_quality=(*checks, *failed), derived=derived)
+        robot=arm.robot.name,
+        joints=tuple(joint.name for joint in arm.robot.joints),
+        model=said,
+        torque=torque,
+        gates=gates,
+        logs=found,
+        cases=cases,
+        cases_left_out=left_out,
+        cases_apart=apart,
+        drawn=_drawn_from(arm),
+        draws=settings.draws,
+        simulation=simulated,
+        simulation_left_out=not_simulated,
+        data_quality=(*checks, *failed),
+        derived=derived,
+    )
 
 
 def _examined(
@@ -208,21 +233,31 @@ def _model(
     given = inputs.material
     if isinstance(given, Arm) and given.p.any():
         return _of_this_robot(given, judges[0]), "estimate-bps, on the logs of role identify"
-    if isinstance(given, Material) and (model := given.model) is not None and (
-            given.named or any(p.value for p in model.base_parameters)):
+    if (
+        isinstance(given, Material)
+        and (model := given.model) is not None
+        and (given.named or any(p.value for p in model.base_parameters))
+    ):
         fitted = {source.sha256 for source in model.sources if source.role == "identify"}
         _refuse_leak(log for log in judges if digest_of(recording(log)) in fitted)
         arm = Arm.from_model(model, given.said)
         if not arm.p.any():
-            raise UsageError("C02", "the model holds friction alone, no inertia", where="--model",
-                             remedy="name the model.json of estimate-bps")
+            raise UsageError(
+                "C02",
+                "the model holds friction alone, no inertia",
+                where="--model",
+                remedy="name the model.json of estimate-bps",
+            )
         return _of_this_robot(arm, judges[0]), given.said
     seen = {log.q.tobytes() + log.tau.tobytes() for log in logs if log.role == "identify"}
     _refuse_leak(log for log in judges if log.q.tobytes() + log.tau.tobytes() in seen)
     if (here := fitted_in_folder(logs)) is None:
-        raise NothingMatched("C06", "no model to validate, and no excitation or free log of role "
-                             "identify to fit one", where=inputs.label,
-                             remedy="give --model model.json, or the folder that has such logs")
+        raise NothingMatched(
+            "C06",
+            "no model to validate, and no excitation or free log of role identify to fit one",
+            where=inputs.label,
+            remedy="give --model model.json, or the folder that has such logs",
+        )
     order = "base parameters and friction together"
     if _friction_held(here):
         order = "friction first, then the base parameters"
@@ -231,15 +266,23 @@ def _model(
 
 def _of_this_robot(arm: Arm, log: ExperimentLog) -> Arm:
     if arm.n_joints != log.n_joints:
-        raise UsageError("C02", f"the model has {arm.n_joints} joints, {log.name} has "
-                         f"{log.n_joints}", where="--model", remedy="give a model of this robot")
+        raise UsageError(
+            "C02",
+            f"the model has {arm.n_joints} joints, {log.name} has {log.n_joints}",
+            where="--model",
+            remedy="give a model of this robot",
+        )
     return arm
 
 
 def _refuse_leak(leaks: Iterable[ExperimentLog]) -> None:
     for log in leaks:
-        raise InputRejected("D14", f"leak: the model was fitted to {log.name}, which shall judge "
-                            "it", where=log.source or log.name, remedy="judge on another recording")
+        raise InputRejected(
+            "D14",
+            f"leak: the model was fitted to {log.name}, which shall judge it",
+            where=log.source or log.name,
+            remedy="judge on another recording",
+        )
 
 
 def _drawn_from(arm: Arm) -> str:
@@ -254,40 +297,56 @@ def _drawn_from(arm: Arm) -> str:
 def _friction_held(arm: Arm) -> bool:
     """Return whether the fit took friction as known: its covariance then has no number of it."""
     numbers = {f"{law.place}:{p.name}" for law in arm.friction for p in law.parameters}
-    return bool(numbers) and arm.uncertainty is not None and numbers.isdisjoint(
-        arm.uncertainty.names)
+    return (
+        bool(numbers) and arm.uncertainty is not None and numbers.isdisjoint(arm.uncertainty.names)
+    )
 
 
 def _refuse_strange(settings: Settings) -> None:
     """Raise C02 for a setting that makes no sense."""
     longest = CONFIG.longest
-    moves, letters = settings.via_points or 0, len(settings.text or "")
-    gate = settings.torque_gate
+    letters, gate = len(settings.text or ""), settings.torque_gate
     for wrong, message, where, remedy in (
-        (settings.elbow not in (None, "up", "down"), f"'{settings.elbow}' is no side of an elbow",
-         "--elbow", "say up or down"),
-        (not (math.isfinite(gate) and gate > 0.0), f"a gate of {gate:g}", "--torque-gate",
-         "give a relative error above 0"),
-        (not 1 <= settings.draws <= CONFIG.most_draws, f"{settings.draws} draws", "--draws",
-         f"give 1 to {CONFIG.most_draws}"),
-        (moves > longest, f"{moves} via points", "--via-points", f"give {longest} at most"),
+        (
+            settings.elbow not in (None, "up", "down"),
+            f"'{settings.elbow}' is no side of an elbow",
+            "--elbow",
+            "say up or down",
+        ),
+        (
+            not (math.isfinite(gate) and gate > 0.0),
+            f"a gate of {gate:g}",
+            "--torque-gate",
+            "give a relative error above 0",
+        ),
+        (
+            not 1 <= settings.draws <= CONFIG.most_draws,
+            f"{settings.draws} draws",
+            "--draws",
+            f"give 1 to {CONFIG.most_draws}",
+        ),
         (letters > longest, f"a text of {letters} letters", "--text", f"give {longest} at most"),
         (settings.seed < 0, f"the seed {settings.seed} is negative", "--seed", "give 0 or more"),
-        (settings.text is not None and settings.via_points is not None, "a text and via points",
-         "--text, --via-points", "give one of them"),
     ):
         if wrong:
             raise UsageError("C02", message, where=where, remedy=remedy)
 
 
-def _derived(log: ExperimentLog, motion: Reconstructed, parts: ArmTorque,
-             settings: Settings) -> tuple[str, ExperimentLog]:
+def _derived(
+    log: ExperimentLog, motion: Reconstructed, parts: ArmTorque, settings: Settings
+) -> tuple[str, ExperimentLog]:
     with_motion = derive(log, "reconstruct", Reconstruction().as_settings(), motion.signals())
     total = parts.total
     how = {"model": None if settings.model is None else Path(settings.model).name}
-    signals = {"tau_model": total, "tau_inertia": parts.inertia, "tau_coriolis": parts.coriolis,
-               "tau_gravity": parts.gravity, "tau_friction_model": parts.friction,
-               "tau_effects": parts.effects, "tau_residual": log.tau - total}
+    signals = {
+        "tau_model": total,
+        "tau_inertia": parts.inertia,
+        "tau_coriolis": parts.coriolis,
+        "tau_gravity": parts.gravity,
+        "tau_friction_model": parts.friction,
+        "tau_effects": parts.effects,
+        "tau_residual": log.tau - total,
+    }
     return slug(log.name), derive(with_motion, "validate-writing", how, signals)
 
 
@@ -297,34 +356,37 @@ def _designed(inputs: Inputs, settings: Settings) -> Result:
     robot = given.robot
     assert robot is not None  # `read` puts it there whenever a task is designed
     arm = _torque_of(given, robot, inputs)
-    if settings.via_points is not None:
-        rng = np.random.default_rng([11, settings.seed])
-        points = via_points(robot, rng, settings.via_points, arm=arm)
-        at, motion = points.at, points.sampled(settings.sample_time)
-        name, experiment = f"{robot.name} via points {settings.seed}", "free"
-        drawn = (motion.dq != 0.0).any(axis=1)
-    else:
-        page = Page(settings.plane_y, settings.x, settings.z, settings.size, lift=settings.lift)
-        acceleration = settings.acceleration
-        pace = Pace(settings.speed, min(settings.slow, settings.speed), acceleration,
-                    Pace.jerk * acceleration / Pace.acceleration)
-        task = writing_task(robot, settings.text or "", page, pace, posture=settings.posture,
-                            elbow=settings.elbow)  # type: ignore[arg-type]
-        reference = task.sampled(settings.sample_time, arm)
-        motion, drawn = reference.motion, reference.drawn
-        name, experiment = f"{robot.name} writing {settings.text}", "writing"
-
-        def at(t: Array) -> Motion:
-            return task.motion(np.minimum(t, task.duration))
-
-    log = planned_log(name, robot, motion, experiment)
-    design = designed(robot, motion, drawn, arm, settings.text)
-    table = controller_table(given.recipe, robot, lambda t: at(t).q, float(motion.t[-1]),
-                             settings.sample_time)
+    page = Page(settings.plane_y, settings.x, settings.z, settings.size, lift=settings.lift)
+    acceleration = settings.acceleration
+    pace = Pace(
+        settings.speed,
+        min(settings.slow, settings.speed),
+        acceleration,
+        Pace.jerk * acceleration / Pace.acceleration,
+    )
+    text, elbow = settings.text or "", settings.elbow
+    task = writing_task(robot, text, page, pace, elbow=elbow)  # type: ignore[arg-type]
+    reference = task.sampled(settings.sample_time, arm)
+    log = planned_log(f"{robot.name} writing {text}", robot, reference.motion)
+    design = designed(robot, reference, arm, text)
+    table = controller_table(
+        given.recipe,
+        robot,
+        lambda t: task.motion(np.minimum(t, task.duration)).q,
+        float(reference.motion.t[-1]),
+        settings.sample_time,
+    )
     return Result(
-        robot=robot.name, joints=tuple(joint.name for joint in robot.joints), model="",
-        torque=None, gates=Gates(settings.torque_gate, None, None), draws=settings.draws,
-        design=design, derived=(("trajectory", log),), table=table)
+        robot=robot.name,
+        joints=tuple(joint.name for joint in robot.joints),
+        model="",
+        torque=None,
+        gates=Gates(settings.torque_gate, None, None),
+        draws=settings.draws,
+        design=design,
+        derived=(("trajectory", log),),
+        table=table,
+    )
 
 
 def _torque_of(given: Material, robot: RobotDescription, inputs: Inputs) -> Arm | None:
@@ -332,9 +394,12 @@ def _torque_of(given: Material, robot: RobotDescription, inputs: Inputs) -> Arm 
     if given.model is not None:
         arm = Arm.from_model(given.model, "--model")
         if arm.n_joints != robot.n_joints:
-            raise UsageError("C02", f"the model has {arm.n_joints} joints, the robot "
-                             f"{robot.n_joints}", where="--model",
-                             remedy="give a model of this robot")
+            raise UsageError(
+                "C02",
+                f"the model has {arm.n_joints} joints, the robot {robot.n_joints}",
+                where="--model",
+                remedy="give a model of this robot",
+            )
         return arm
     fitted = fitted_in_folder([opened.log for opened in inputs.logs]) if inputs.logs else None
     if fitted is None and all(joint.link is not None for joint in robot.joints):
@@ -375,6 +440,16 @@ def _reads(log: ExperimentLog, settings: Settings) -> bool:
     return log.role == "validate" or (log.role == "identify" and log.experiment != "frf")
 
 
-STAGE = Stage("validate-writing", "Validate on the writing task", Settings, compute, report, read,
-              write, _exit_code, lambda result: result.data_quality,
-              uses=Uses(_reads, before=True), sessions="one")
+STAGE = Stage(
+    "validate-writing",
+    "Validate on the writing task",
+    Settings,
+    compute,
+    report,
+    read,
+    write,
+    _exit_code,
+    lambda result: result.data_quality,
+    uses=Uses(_reads, before=True),
+    sessions="one",
+)

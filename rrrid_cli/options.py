@@ -34,7 +34,7 @@ COMMANDS += ["diagnose", "extend", "export", "compare", "report", "schema", "doc
 STAGES = tuple(name for name in COMMANDS if name not in ("batch", "report", "schema", "doctor"))
 # What a stage reads by itself. Within `run` it has logs and models from the run, unless the field
 # says `in_run`.
-OWN_INPUTS = ("identify", "validate", "reference", "model", "text", "via_points", "recipe")
+OWN_INPUTS = ("identify", "validate", "reference", "model", "text", "recipe")
 KINDS = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
 METAVARS = {int: "NUMBER", float: "NUMBER", str: "TEXT", Path: "PATH"}
 EXAMPLES = {int: ("whole number", "4", "20,20,10"), float: ("number", "0.5", "50,60,70")}

@@ -131,7 +131,7 @@ def imitate(
     return _in_loop(log, bare, Plant.of(arm), experiment, how, known, (file, settings, draw))
 
 
-def _in_loop(  # noqa: PLR0913
+def _in_loop(
     log: ExperimentLog,
     bare: ExperimentLog,
     plant: Plant,

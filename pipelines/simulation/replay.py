@@ -102,7 +102,7 @@ def simulate_windows(  # noqa: PLR0913
 
 
 @np.errstate(all="ignore")  # a window may run away: its steps do not settle then
-def _follow(  # noqa: PLR0913
+def _follow(
     plant: Plant, motion: Motion, tau: Array, sample_time: float, first: Indices, steps: int
 ) -> Array:
     """Return q and dq (windows, length, 2 joints) that follow tau (windows, length, joints)."""

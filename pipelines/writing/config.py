@@ -12,17 +12,10 @@ class WritingConfig:
     """Of the task, of its inverse kinematics and of the validation."""
 
     # the task
-    longest: int = 200  # letters or moves: minutes of writing, seconds of planning
+    longest: int = 200  # letters: minutes of writing, seconds of planning
     longest_sample_time: float = 0.1  # [s] of a reference
-    fewest_joints: int = 3  # the tip has three coordinates
-    authority: float = 0.95  # of each limit that a move uses; the rest is for the controller
-    move_points: int = 101  # of a move at which its torque is computed
     # inverse kinematics
     border: float = 0.005  # [m] from the border of the workspace, where joint speeds diverge
-    flattest: float = 0.02  # smallest to largest singular value of the Jacobian that is used
-    every: int = 80  # samples from one start of Newton's method to the next
-    reached: float = 1e-9  # [m] from a tip, above which it counts as out of reach
-    solved: float = 1e-12  # [m] of a solution: rounding of positions of about a metre
     # control cases
     same_reference: float = 1e-6  # [rad] by which references of one task differ: rounding
     most_draws: int = 1000  # of models on which cases are simulated

@@ -30,12 +30,28 @@ from pipelines.simulation.plant import Plant
 from pipelines.simulation.step import choose_step
 from pipelines.writing.config import CONFIG
 
-__all__ = ["CASES", "Case", "TipStd", "TipTrack", "case_of", "measured_cases", "one_task",
-           "possible", "simulated_cases", "tip_std", "why_not"]
+__all__ = [
+    "CASES",
+    "Case",
+    "TipStd",
+    "TipTrack",
+    "case_of",
+    "measured_cases",
+    "one_task",
+    "possible",
+    "simulated_cases",
+    "tip_std",
+    "why_not",
+]
 
 CASES: tuple[tuple[str, ...], ...] = (
-    (), ("friction",), ("friction", "inertia"), ("friction", "coriolis"), ("friction", "gravity"),
-    ("friction", "inertia", "coriolis", "gravity"))
+    (),
+    ("friction",),
+    ("friction", "inertia"),
+    ("friction", "coriolis"),
+    ("friction", "gravity"),
+    ("friction", "inertia", "coriolis", "gravity"),
+)
 
 
 @dataclass(frozen=True)
@@ -90,8 +106,13 @@ def tip_std(log: ExperimentLog, q: Array) -> Array:
 
 def one_task(logs: Sequence[ExperimentLog], like: ExperimentLog) -> list[ExperimentLog]:
     """Return those of `logs` with the robot, the reference and the gains of `like`."""
-    return [log for log in logs if log.robot_text == like.robot_text
-            and _same_reference(log, like) and _same_gains(log, like)]
+    return [
+        log
+        for log in logs
+        if log.robot_text == like.robot_text
+        and _same_reference(log, like)
+        and _same_gains(log, like)
+    ]
 
 
 def _same_reference(one: ExperimentLog, two: ExperimentLog) -> bool:
@@ -100,8 +121,9 @@ def _same_reference(one: ExperimentLog, two: ExperimentLog) -> bool:
         return False
     a, b = one["q_ref"], two["q_ref"]
     first, second = (
-        int(np.argmax((np.abs(q - q[0]) > CONFIG.same_reference).any(axis=1))) for q in (a, b))
-    a, b = a[max(0, first - second):], b[max(0, second - first):]
+        int(np.argmax((np.abs(q - q[0]) > CONFIG.same_reference).any(axis=1))) for q in (a, b)
+    )
+    a, b = a[max(0, first - second) :], b[max(0, second - first) :]
     shared = min(len(a), len(b))
     if shared < CONFIG.shared * max(one.n_samples, two.n_samples):
         return False
@@ -113,8 +135,10 @@ def _same_gains(one: ExperimentLog, two: ExperimentLog) -> bool:
     if a is None or b is None:
         return a is b
     gains = ((a.kp, b.kp), (a.kd, b.kd), (a.ki, b.ki))
-    return all(x is y if x is None or y is None else np.allclose(x, y, rtol=1e-9, atol=0.0)
-               for x, y in gains)
+    return all(
+        x is y if x is None or y is None else np.allclose(x, y, rtol=1e-9, atol=0.0)
+        for x, y in gains
+    )
 
 
 def measured_cases(pairs: Sequence[tuple[ExperimentLog, Reconstructed]]) -> dict[int, Case]:
@@ -159,12 +183,14 @@ def possible(log: ExperimentLog, cases: Iterable[int]) -> tuple[list[int], str]:
     lacking = ", ".join(str(case) for case in cases if case not in some)
     if not lacking:
         return some, ""
-    return some, (f"cases {lacking} would have inertia ahead, and {log.name} has no signal "
-                  "ddq_ref; log it")
+    return some, (
+        f"cases {lacking} would have inertia ahead, and {log.name} has no signal ddq_ref; log it"
+    )
 
 
-def simulated_cases(log: ExperimentLog, arm: Arm, residual: Array, cases: Sequence[int],
-                    draws: int, seed: int) -> dict[int, Case]:
+def simulated_cases(
+    log: ExperimentLog, arm: Arm, residual: Array, cases: Sequence[int], draws: int, seed: int
+) -> dict[int, Case]:
     """Simulate `cases` on the PD controller and the reference of `log`.
 
     Args:
@@ -182,10 +208,17 @@ def simulated_cases(log: ExperimentLog, arm: Arm, residual: Array, cases: Sequen
     step = choose_step(plant, experiment)
     ahead, owners = _feedforward(experiment, arm, cases, draws, seed)
     v = ahead if experiment.v is None else ahead + experiment.v[..., None]
-    done = run(plant, replace(experiment, v=v), step.per_sample, None, range(len(owners)),
-               step.exact)
-    return {case: _case(case, [(log, done.true_q[k]) for k, owner in enumerate(owners)
-                               if owner == case], "simulated") for case in cases}
+    done = run(
+        plant, replace(experiment, v=v), step.per_sample, None, range(len(owners)), step.exact
+    )
+    return {
+        case: _case(
+            case,
+            [(log, done.true_q[k]) for k, owner in enumerate(owners) if owner == case],
+            "simulated",
+        )
+        for case in cases
+    }
 
 
 def _replayed(residual: Array, experiment: Experiment) -> Hooks:
@@ -197,27 +230,30 @@ def _replayed(residual: Array, experiment: Experiment) -> Hooks:
         place = (float(motion.t[0]) - experiment.start_time) / experiment.sample_time
         k = min(max(int(place), 0), last)
         share = min(max(place - k, 0.0), 1.0)
-        return np.asarray((1.0 - share) * residual[k:k + 1] + share * residual[k + 1:k + 2])
+        return np.asarray((1.0 - share) * residual[k : k + 1] + share * residual[k + 1 : k + 2])
 
     return Hooks(load=load)
 
 
-def _feedforward(experiment: Experiment, arm: Arm, cases: Sequence[int], draws: int,
-                 seed: int) -> tuple[Array, list[int]]:
+def _feedforward(
+    experiment: Experiment, arm: Arm, cases: Sequence[int], draws: int, seed: int
+) -> tuple[Array, list[int]]:
     """Return the feed-forward (samples, joints, replicas) [N m], and each replica's case.
 
     Case 1 is simulated once, the others with every draw.
     """
     t = experiment.start_time + experiment.sample_time * np.arange(
-        experiment.n_samples, dtype=np.float64)
+        experiment.n_samples, dtype=np.float64
+    )
     motion = Motion(t, experiment.q_ref, experiment.dq_ref, experiment.ddq_ref)
     rng = np.random.default_rng([24, seed])
     models = [drawn(arm, rng).nominal.torque_parts(motion) for _ in range(draws)]
     columns, owners = [], []
     for case in cases:
         for parts in models if CASES[case - 1] else models[:1]:
-            torque = sum((getattr(parts, name) for name in CASES[case - 1]),
-                         np.zeros(experiment.q_ref.shape))
+            torque = sum(
+                (getattr(parts, name) for name in CASES[case - 1]), np.zeros(experiment.q_ref.shape)
+            )
             columns.append(torque)
             owners.append(case)
     return np.stack(columns, axis=-1), owners

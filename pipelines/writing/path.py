@@ -44,8 +44,11 @@ class Page:
         numbers = (self.y, self.x, self.z, self.height, self.gap, self.lift)
         if not all(map(math.isfinite, numbers)) or self.height <= 0.0 or self.gap < 0.0:
             raise UsageError(
-                "C02", "a page needs finite numbers, a height above 0 and a gap of at least 0",
-                where="page", remedy="correct the place or size of the text")
+                "C02",
+                "a page needs finite numbers, a height above 0 and a gap of at least 0",
+                where="page",
+                remedy="correct the place or size of the text",
+            )
 
     def point(self, u: float, w: float) -> Point:
         """Return the point [m] at (u, w), in heights from the middle of the text."""
@@ -146,8 +149,11 @@ def lay_out(text: str, page: Page) -> TipPath:
     for k, character in enumerate(text):
         if (known := glyph(character)) is None:
             raise UsageError(
-                "C02", f"letter {k + 1} of the text, '{character}', cannot be written",
-                where="text", remedy="write with the letters A to Z, digits and spaces")
+                "C02",
+                f"letter {k + 1} of the text, '{character}', cannot be written",
+                where="text",
+                remedy="write with the letters A to Z, digits and spaces",
+            )
         glyphs.append(known)
     left = -0.5 * (sum(known.width for known in glyphs) + page.gap * (len(glyphs) - 1))
     pieces: list[Piece] = []
@@ -159,15 +165,26 @@ def lay_out(text: str, page: Page) -> TipPath:
                 there = page.point(left + u, w - 0.5)
                 if sweep:
                     dx, dz = at[0] - there[0], at[2] - there[2]
-                    pieces.append(Arc(there, math.hypot(dx, dz), math.atan2(dz, dx),
-                                      math.radians(sweep[0]), letter))
+                    pieces.append(
+                        Arc(
+                            there,
+                            math.hypot(dx, dz),
+                            math.atan2(dz, dx),
+                            math.radians(sweep[0]),
+                            letter,
+                        )
+                    )
                 else:
                     pieces.append(Line(at, there, letter))
                 at = pieces[-1].end
         left += known.width + page.gap
     if not pieces:
-        raise UsageError("C02", "there is nothing to write", where="text",
-                         remedy=f"give at least one of {CHARACTERS.strip()}")
+        raise UsageError(
+            "C02",
+            "there is nothing to write",
+            where="text",
+            remedy=f"give at least one of {CHARACTERS.strip()}",
+        )
     return TipPath(text, page, tuple(pieces))
 
 

@@ -1,4 +1,4 @@
-"""Design the joint motion of a text written at a given pace, or of random moves.
+"""Design the joint motion of a text that the RRR arm writes at a given pace.
 
     task = writing_task(robot, "RRRID 2004")
     reference = task.sampled(1e-3)          q, dq, ddq, exact; tip, its speed, and the letter
@@ -10,8 +10,9 @@ Kostić et al. 2004, Section III.B, eq. (9), (A3), Figs. 2 and 3. It starts and 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -19,19 +20,36 @@ import numpy.typing as npt
 from pipelines.dynamics import rrr
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.body import Array, Motion
-from pipelines.dynamics.kinematics import serial_chain, tip_position
-from pipelines.dynamics.rrr_kinematics import rrr_geometry
+from pipelines.dynamics.rrr_kinematics import (
+    BRANCHES,
+    Geometry,
+    Reach,
+    inverse,
+    joint_rates,
+    rrr_geometry,
+)
 from pipelines.errors import UsageError
 from pipelines.io import schema
 from pipelines.io.log import ExperimentLog, Signal
 from pipelines.io.robot import RobotDescription, format_robot
 from pipelines.writing.config import CONFIG
-from pipelines.writing.inverse_kinematics import ClosedForm, Elbow, Numerical, Obstacle
 from pipelines.writing.path import Page, TipPath, lay_out
 from pipelines.writing.timing import Pace, TimeLaw, time_law
 
-__all__ = ["Demand", "Designed", "TipMotion", "WritingReference", "WritingTask", "demands",
-           "designed", "planned_log", "refuse_sample_time", "writing_task"]
+__all__ = [
+    "Demand",
+    "Designed",
+    "Elbow",
+    "TipMotion",
+    "WritingReference",
+    "WritingTask",
+    "demands",
+    "designed",
+    "planned_log",
+    "writing_task",
+]
+
+Elbow = Literal["up", "down"]
 
 ROUNDING = 1e-9  # numerics: share of a limit above it at which it still is met
 
@@ -68,7 +86,8 @@ class WritingTask:
     path: TipPath
     pace: Pace
     law: TimeLaw
-    inverse: ClosedForm | Numerical
+    geometry: Geometry
+    elbow: Elbow
     rest: float  # [s] at rest before and after
 
     @property
@@ -84,7 +103,7 @@ class WritingTask:
     def tip(self, t: Array) -> TipMotion:
         """Return the tip at times t (samples,) [s].
 
-            x = x(s),   ẋ = ṡ x',   ẍ = s̈ x' + ṡ² x''
+        x = x(s),   ẋ = ṡ x',   ẍ = s̈ x' + ṡ² x''
         """
         s, ds, dds = self.law.at(t - self.rest)
         piece = self._piece(t)
@@ -93,7 +112,7 @@ class WritingTask:
             here = piece == k
             along = np.clip(s[here] - self.path.starts[k], 0.0, self.path.pieces[k].length)
             position[here], tangent[here], curvature[here] = self.path.pieces[k].at(along)
-        acceleration = dds[:, None] * tangent + ds[:, None]**2 * curvature
+        acceleration = dds[:, None] * tangent + ds[:, None] ** 2 * curvature
         return TipMotion(position, ds[:, None] * tangent, acceleration)
 
     def motion(self, t: Array, tip: TipMotion | None = None) -> Motion:
@@ -103,12 +122,38 @@ class WritingTask:
             UsageError: C02, the tip is out of reach or at a singularity; names the letter.
         """
         tip = tip or self.tip(t)
-        found = self.inverse.motion(tip.position, tip.velocity, tip.acceleration)
-        if isinstance(found, Obstacle):
-            where = self._place(t[found.sample], tip.position[found.sample])
-            raise UsageError("C02", f"the arm cannot follow: {found.why}", where=where,
-                             remedy=found.remedy)
-        return Motion(t, *found)
+        self._refuse_unreachable(t, tip.position)
+        # one branch of eq. (A3) throughout: branches meet only at singular postures
+        branch = BRANCHES.index((1, -1 if self.elbow == "up" else 1))
+        q = np.unwrap(inverse(self.geometry, tip.position).q[branch], axis=0)
+        return Motion(t, q, *joint_rates(self.geometry, q, tip.velocity, tip.acceleration))
+
+    def _refuse_unreachable(self, t: Array, tip: Array) -> None:
+        """Refuse the first tip out of reach, or the first too near to the border."""
+        arm, status = self.geometry, inverse(self.geometry, tip).status
+        beyond, height = np.hypot(tip[:, 0], tip[:, 1]) - abs(arm.d), tip[:, 2] - arm.d1
+        r = np.sqrt(np.maximum(beyond, 0.0) * (beyond + 2 * abs(arm.d)) + height**2)
+        room = {
+            Reach.SHOULDER: beyond,
+            Reach.ELBOW: np.minimum(r - abs(arm.a3 - arm.a2), arm.a2 + arm.a3 - r),
+        }
+        out = np.flatnonzero(status >= Reach.INSIDE_CYLINDER)
+        near = np.flatnonzero(np.minimum(*room.values()) < CONFIG.border)
+        if out.size:
+            k = int(out[0])
+            why = Reach(int(status[k])).words
+        elif near.size:
+            k = int(near[0])
+            kind = min(room, key=lambda reach: float(room[reach][k]))
+            why = f"within {CONFIG.border * 1e3:g} mm of a posture that is {kind.words}"
+        else:
+            return
+        raise UsageError(
+            "C02",
+            f"the arm cannot follow: {why}",
+            where=self._place(t[k], tip[k]),
+            remedy="move the text, or make it smaller",
+        )
 
     def sampled(self, sample_time: float, arm: Arm | None = None) -> WritingReference:
         """Return the reference every `sample_time` [s]; with `arm` its torque is checked too.
@@ -117,13 +162,18 @@ class WritingTask:
             UsageError: C02, out of reach, through a singularity, or beyond a limit: names the
                 letter, the place and the limit.
         """
-        refuse_sample_time(sample_time)
+        if not 0.0 < sample_time <= CONFIG.longest_sample_time:
+            raise UsageError(
+                "C02",
+                f"a sample time of {sample_time:g} s",
+                where="sample time",
+                remedy=f"give one up to {CONFIG.longest_sample_time:g} s",
+            )
         samples = math.ceil(self.duration / sample_time - ROUNDING) + 1
         t = np.arange(samples, dtype=np.float64) * sample_time
         tip = self.tip(t)
         motion = self.motion(t, tip)
-        _refuse_beyond_limits(self.robot, motion, arm,
-                              lambda k: self._place(t[k], tip.position[k]))
+        _refuse_beyond_limits(self.robot, motion, arm, lambda k: self._place(t[k], tip.position[k]))
         piece = self._piece(t)
         moving = (t > self.rest) & (t < self.rest + self.law.duration)
         letter = np.array([one.letter for one in self.path.pieces], dtype=np.intp)[piece]
@@ -140,48 +190,37 @@ class WritingTask:
         return f"{way}{self.path.place(piece.letter)}, tip at ({x:.3f}, {y:.3f}, {z:.3f}) m"
 
 
-def writing_task(robot: RobotDescription, text: str, page: Page | None = None,
-                 pace: Pace | None = None, *, elbow: Elbow | None = None,
-                 posture: Sequence[float] | None = None, rest: float = 0.5) -> WritingTask:
+def writing_task(
+    robot: RobotDescription,
+    text: str,
+    page: Page | None = None,
+    pace: Pace | None = None,
+    *,
+    elbow: Elbow | None = None,
+    rest: float = 0.5,
+) -> WritingTask:
     """Return `text` as a task for `robot`.
 
     Args:
-        elbow: of the RRR arm, which has a closed form; "up" by default.
-        posture: (joints,) [rad] of any other arm, near the task: the numerical inverse starts
-            there. By default the middle of each joint's range.
+        elbow: "up" by default.
         rest: [s] at rest before and after.
 
     Raises:
-        UsageError: C02, the text or the arm makes no sense, or an elbow or a posture that the
-            arm does not have.
+        UsageError: C02, the text makes no sense, or the arm is not the RRR arm.
     """
     if not (math.isfinite(rest) and rest >= 0.0):
         raise UsageError("C02", f"a rest of {rest:g} s", where="rest", remedy="give at least 0 s")
+    if not rrr.fits(robot):
+        raise UsageError(
+            "C02",
+            "a text is laid out for the RRR arm alone",
+            where=robot.name,
+            remedy="any other log of role validate judges a model as well: record an "
+            "excitation that no fit uses",
+        )
     path, pace = lay_out(text, page or Page()), pace or Pace()
-    inverse = _inverse(robot, elbow, posture)
-    return WritingTask(robot, path, pace, time_law(path, pace), inverse, rest)
-
-
-def _inverse(robot: RobotDescription, elbow: Elbow | None,
-             posture: Sequence[float] | None) -> ClosedForm | Numerical:
-    if rrr.fits(robot):
-        if posture is not None:
-            raise UsageError("C02", "a posture for an arm that has a closed form",
-                             where=robot.name, remedy="say elbow up or down")
-        return ClosedForm(rrr_geometry(robot), elbow or "up")
-    if elbow is not None:
-        raise UsageError("C02", f"elbow {elbow} of an arm that is not the RRR arm",
-                         where=robot.name, remedy="give a posture near the task instead")
-    if robot.n_joints < CONFIG.fewest_joints:
-        raise UsageError("C02", f"{robot.n_joints} joints cannot write", where=robot.name,
-                         remedy="writing takes three joints or more")
-    if posture is None:
-        low, high = np.array([joint.position for joint in robot.joints]).T
-        posture = np.where(np.isfinite(high - low), 0.5 * (low + high), 0.0).tolist()
-    if len(posture) != robot.n_joints:
-        raise UsageError("C02", f"a posture of {len(posture)} joints for an arm of "
-                         f"{robot.n_joints}", where="posture", remedy="give one angle a joint")
-    return Numerical(serial_chain(robot), np.array(posture, dtype=float))
+    law = time_law(path, pace)
+    return WritingTask(robot, path, pace, law, rrr_geometry(robot), elbow or "up", rest)
 
 
 @dataclass(frozen=True)
@@ -199,8 +238,10 @@ class Demand:
 
 def demands(robot: RobotDescription, motion: Motion, arm: Arm | None = None) -> tuple[Demand, ...]:
     """Return the peaks of speed, acceleration and, with a model, torque of each joint."""
-    signals = [("speed", "velocity", motion.dq, "rad/s", "m/s"),
-               ("acceleration", "acceleration", motion.ddq, "rad/s^2", "m/s^2")]
+    signals = [
+        ("speed", "velocity", motion.dq, "rad/s", "m/s"),
+        ("acceleration", "acceleration", motion.ddq, "rad/s^2", "m/s^2"),
+    ]
     if arm is not None:
         signals.append(("torque", "torque", arm.torque(motion), "N m", "N"))
     found = []
@@ -209,13 +250,15 @@ def demands(robot: RobotDescription, motion: Motion, arm: Arm | None = None) -> 
             sample = int(np.argmax(np.abs(values[:, j])))
             peak, limit = float(abs(values[sample, j])), float(getattr(joint, key))
             unit = turning if joint.revolute else sliding
-            found.append(Demand(j + 1, quantity, peak, limit, unit, peak / limit,
-                                float(motion.t[sample])))
+            found.append(
+                Demand(j + 1, quantity, peak, limit, unit, peak / limit, float(motion.t[sample]))
+            )
     return tuple(found)
 
 
-def _refuse_beyond_limits(robot: RobotDescription, motion: Motion, arm: Arm | None,
-                          place: Callable[[int], str]) -> None:
+def _refuse_beyond_limits(
+    robot: RobotDescription, motion: Motion, arm: Arm | None, place: Callable[[int], str]
+) -> None:
     """Refuse a motion beyond a limit; `place` says in words where a sample is."""
     for j, joint in enumerate(robot.joints):
         low, high = joint.position
@@ -224,9 +267,12 @@ def _refuse_beyond_limits(robot: RobotDescription, motion: Motion, arm: Arm | No
             k = int(outside[0])
             unit = "rad" if joint.revolute else "m"
             raise UsageError(
-                "C02", f"joint {j + 1}, {joint.name}, would be at {motion.q[k, j]:.3f} {unit} at "
+                "C02",
+                f"joint {j + 1}, {joint.name}, would be at {motion.q[k, j]:.3f} {unit} at "
                 f"{motion.t[k]:.3f} s; its range is {low:.3f} to {high:.3f} {unit}",
-                where=place(k), remedy="move the task, or shrink it")
+                where=place(k),
+                remedy="move the task, or shrink it",
+            )
     found = demands(robot, motion, arm)
     for quantity, power in (("speed", 1), ("acceleration", 2), ("torque", 0)):
         of = [one for one in found if one.quantity == quantity]
@@ -235,39 +281,48 @@ def _refuse_beyond_limits(robot: RobotDescription, motion: Motion, arm: Arm | No
             continue
         remedy = "slow the task down, or move it to where the arm's own weight asks for less"
         if power:
-            slower = 100.0 * worst.share**(-1.0 / power)
+            slower = 100.0 * worst.share ** (-1.0 / power)
             remedy = f"slow the task down to {slower:.0f} % of its speed, or move it"
         raise UsageError(
-            "C02", f"joint {worst.joint}, {robot.joints[worst.joint - 1].name}, would need "
+            "C02",
+            f"joint {worst.joint}, {robot.joints[worst.joint - 1].name}, would need "
             f"{quantity} {worst.peak:.4g} {worst.unit} at {worst.t:.3f} s; its limit is "
-            f"{worst.limit:.4g} {worst.unit}", remedy=remedy,
-            where=place(int(np.searchsorted(motion.t, worst.t))))
+            f"{worst.limit:.4g} {worst.unit}",
+            remedy=remedy,
+            where=place(int(np.searchsorted(motion.t, worst.t))),
+        )
 
 
-def refuse_sample_time(sample_time: float) -> None:
-    """Raise C02 for a sample time [s] that makes no sense."""
-    if not (math.isfinite(sample_time) and 0.0 < sample_time <= CONFIG.longest_sample_time):
-        raise UsageError("C02", f"a sample time of {sample_time:g} s", where="sample time",
-                         remedy=f"give one up to {CONFIG.longest_sample_time:g} s")
-
-
-def planned_log(name: str, robot: RobotDescription, motion: Motion, experiment: str = "writing",
-                role: str = "validate") -> ExperimentLog:
+def planned_log(
+    name: str,
+    robot: RobotDescription,
+    motion: Motion,
+    experiment: str = "writing",
+    role: str = "validate",
+) -> ExperimentLog:
     """Return the log that carries `motion` (two samples or more, even) as its reference."""
     values = {"t": motion.t, "q_ref": motion.q, "dq_ref": motion.dq, "ddq_ref": motion.ddq}
-    signals = {key: Signal(value, schema.unit_of(key), schema.SIGNALS[key][1])
-               for key, value in values.items()}
+    signals = {
+        key: Signal(value, schema.unit_of(key), schema.SIGNALS[key][1])
+        for key, value in values.items()
+    }
     sample_time = float(motion.t[-1] - motion.t[0]) / (len(motion.t) - 1)
-    return ExperimentLog(name=name, experiment=experiment, role=role, origin="planned",
-                         robot_name=robot.name, sample_time=sample_time,
-                         robot_text=format_robot(robot), signals=signals)
+    return ExperimentLog(
+        name=name,
+        experiment=experiment,
+        role=role,
+        origin="planned",
+        robot_name=robot.name,
+        sample_time=sample_time,
+        robot_text=format_robot(robot),
+        signals=signals,
+    )
 
 
 @dataclass(frozen=True)
 class Designed:
     """A task in figures; series are thinned."""
 
-    kind: str  # "text" | "via points"
     text: str
     duration: float  # [s]
     limits: tuple[Demand, ...]
@@ -282,14 +337,23 @@ class Designed:
     units: tuple[str, ...]  # of each joint's position
 
 
-def designed(robot: RobotDescription, motion: Motion, drawn: npt.NDArray[np.bool_],
-             arm: Arm | None, text: str | None) -> Designed:
-    """Return the figures of a motion that writes `text`, or of moves without one."""
+def designed(
+    robot: RobotDescription, reference: WritingReference, arm: Arm | None, text: str
+) -> Designed:
+    """Return the figures of a reference that writes `text`."""
+    motion, tip = reference.motion, reference.tip
     rows = slice(None, None, max(1, -(-len(motion.t) // CONFIG.points)))
-    tip = tip_position(serial_chain(robot), motion.q)
-    speed = np.linalg.norm(np.gradient(tip, motion.t, axis=0), axis=1)
     return Designed(
-        "via points" if text is None else "text", text or "", float(motion.t[-1]),
-        demands(robot, motion, arm), arm is not None, motion.t[rows], motion.q[rows],
-        motion.dq[rows], motion.ddq[rows], tip[rows], drawn[rows].astype(float), speed[rows],
-        tuple("rad" if joint.revolute else "m" for joint in robot.joints))
+        text,
+        float(motion.t[-1]),
+        demands(robot, motion, arm),
+        arm is not None,
+        motion.t[rows],
+        motion.q[rows],
+        motion.dq[rows],
+        motion.ddq[rows],
+        tip.position[rows],
+        reference.drawn[rows].astype(float),
+        tip.speed[rows],
+        ("rad",) * robot.n_joints,
+    )

@@ -47,15 +47,22 @@ class Pace:
         positive = all(math.isfinite(rate) and rate > 0.0 for rate in rates)
         if not positive or not 0.0 <= self.slow <= self.fast:
             raise UsageError(
-                "C02", f"a pace of {self.fast:g} m/s, {self.slow:g} m/s in slow phases, "
-                f"{self.acceleration:g} m/s^2 and {self.jerk:g} m/s^3", where="pace",
+                "C02",
+                f"a pace of {self.fast:g} m/s, {self.slow:g} m/s in slow phases, "
+                f"{self.acceleration:g} m/s^2 and {self.jerk:g} m/s^3",
+                where="pace",
                 remedy="give a speed, acceleration and jerk above 0, and slow phases from 0 to "
-                "the speed")
+                "the speed",
+            )
 
     def slowed(self, factor: float) -> Pace:
         """Return the pace that follows the same path in 1/factor of the time."""
-        return Pace(self.fast * factor, self.slow * factor, self.acceleration * factor**2,
-                    self.jerk * factor**3)
+        return Pace(
+            self.fast * factor,
+            self.slow * factor,
+            self.acceleration * factor**2,
+            self.jerk * factor**3,
+        )
 
     def seconds(self, v0: float, v1: float) -> float:
         """Return how long a change of speed takes [s] at the largest acceleration and jerk."""
@@ -88,7 +95,7 @@ class TimeLaw:
     def at(self, t: Array) -> tuple[Array, Array, Array]:
         """Return arc length [m], speed [m/s] and acceleration [m/s^2] along the path, (samples,).
 
-            s = s0 + T (v0 r + (v1 - v0)(2.5 r⁴ - 3 r⁵ + r⁶));  s̈ = (v1 - v0) 30 r² (1 - r)² / T
+        s = s0 + T (v0 r + (v1 - v0)(2.5 r⁴ - 3 r⁵ + r⁶));  s̈ = (v1 - v0) 30 r² (1 - r)² / T
         """
         k = self.phase(t)
         length = np.diff(self.start)[k]  # [s]
@@ -96,15 +103,21 @@ class TimeLaw:
         v0, rise = self.before[k], self.after[k] - self.before[k]
         s = self.s[k] + length * (v0 * r + rise * r**4 * (2.5 - 3.0 * r + r * r))
         speed = v0 + rise * r**3 * (10.0 - 15.0 * r + 6.0 * r * r)
-        return s, speed, rise * 30.0 * (r * (1.0 - r))**2 / length
+        return s, speed, rise * 30.0 * (r * (1.0 - r)) ** 2 / length
 
 
 def time_law(path: TipPath, pace: Pace) -> TimeLaw:
     """Return the time law: each piece as fast as the pace, its length and curvature allow."""
     caps = [min(pace.fast, math.sqrt(pace.acceleration * piece.radius)) for piece in path.pieces]
     lengths = [piece.length for piece in path.pieces]
-    speeds = [0.0, *(0.0 if joint == "corner" else min(pace.slow, one, two)
-                     for joint, (one, two) in zip(path.joints, pairwise(caps), strict=True)), 0.0]
+    speeds = [
+        0.0,
+        *(
+            0.0 if joint == "corner" else min(pace.slow, one, two)
+            for joint, (one, two) in zip(path.joints, pairwise(caps), strict=True)
+        ),
+        0.0,
+    ]
     for k, length in enumerate(lengths):  # not faster than can be reached from the joint before
         speeds[k + 1] = _reachable(pace, speeds[k], speeds[k + 1], length)
     for k in reversed(range(len(lengths))):  # nor than can still be slowed down
@@ -114,9 +127,11 @@ def time_law(path: TipPath, pace: Pace) -> TimeLaw:
         top = _top(pace, v0, v1, caps[k], lengths[k])
         rest = lengths[k] - pace.distance(v0, top) - pace.distance(top, v1)
         s = float(path.starts[k])
-        for one, two, seconds in ((v0, top, pace.seconds(v0, top)),
-                                  (top, top, max(rest, 0.0) / top),
-                                  (top, v1, pace.seconds(top, v1))):
+        for one, two, seconds in (
+            (v0, top, pace.seconds(v0, top)),
+            (top, top, max(rest, 0.0) / top),
+            (top, v1, pace.seconds(top, v1)),
+        ):
             if seconds > SHORTEST:
                 phases.append((s, one, two, k))
                 times.append(times[-1] + seconds)
@@ -134,8 +149,9 @@ def _reachable(pace: Pace, start: float, wish: float, length: float) -> float:
 
 def _top(pace: Pace, v0: float, v1: float, cap: float, length: float) -> float:
     """Return the largest speed up to `cap` between v0 and v1 on a piece of this length."""
-    return largest(lambda v: pace.distance(v0, v) + pace.distance(v, v1) <= length,
-                   max(v0, v1), cap)
+    return largest(
+        lambda v: pace.distance(v0, v) + pace.distance(v, v1) <= length, max(v0, v1), cap
+    )
 
 
 def largest(fits: Callable[[float], bool], low: float, high: float) -> float:

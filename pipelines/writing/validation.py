@@ -42,9 +42,21 @@ from pipelines.writing.control_cases import (
 )
 from pipelines.writing.task import Designed
 
-__all__ = ["Course", "Gates", "Largest", "Result", "Stretch", "TorqueError",
-           "TorqueValidation", "control_cases", "gates_of", "pooled", "residual", "simulated_task",
-           "torque_validation"]
+__all__ = [
+    "Course",
+    "Gates",
+    "Largest",
+    "Result",
+    "Stretch",
+    "TorqueError",
+    "TorqueValidation",
+    "control_cases",
+    "gates_of",
+    "pooled",
+    "residual",
+    "simulated_task",
+    "torque_validation",
+]
 
 Mask = npt.NDArray[np.bool_]
 
@@ -118,8 +130,9 @@ def residual(log: ExperimentLog, motion: Reconstructed, parts: ArmTorque) -> Arr
     return _low_passed(log, motion, log.tau - parts.total)[0]
 
 
-def _low_passed(log: ExperimentLog, motion: Reconstructed,
-                torque: Array) -> tuple[Array, float | None]:
+def _low_passed(
+    log: ExperimentLog, motion: Reconstructed, torque: Array
+) -> tuple[Array, float | None]:
     """Return `torque` in the band of motion and dry friction, and that cut-off [Hz]."""
     torque = np.where(_known(log, motion)[:, None], torque, 0.0)
     how = condition(motion.motion, 1.0 / log.sample_time, None, None, np.zeros(log.n_joints))
@@ -128,8 +141,9 @@ def _low_passed(log: ExperimentLog, motion: Reconstructed,
     return zero_phase(torque, how.low_pass), how.cutoff_hz
 
 
-def torque_validation(log: ExperimentLog, motion: Reconstructed, arm: Arm, parts: ArmTorque,
-                      draw: bool = True) -> TorqueValidation:
+def torque_validation(
+    log: ExperimentLog, motion: Reconstructed, arm: Arm, parts: ArmTorque, draw: bool = True
+) -> TorqueValidation:
     """Compare the model's torque, `parts`, with the measured one; say where it is worst."""
     known = _known(log, motion)
     error, measured = (log.tau - parts.total)[known], log.tau[known]
@@ -143,8 +157,15 @@ def torque_validation(log: ExperimentLog, motion: Reconstructed, arm: Arm, parts
         here = np.flatnonzero((at == k) & known)
         if here.size:
             rms = _rms(smooth[here])
-            stretches.append(Stretch(label, float(t[here[0]]), float(t[here[-1]]),
-                                     tuple(rms.tolist()), tuple(_ratio(rms, whole).tolist())))
+            stretches.append(
+                Stretch(
+                    label,
+                    float(t[here[0]]),
+                    float(t[here[-1]]),
+                    tuple(rms.tolist()),
+                    tuple(_ratio(rms, whole).tolist()),
+                )
+            )
     worst = []
     for j in range(log.n_joints):
         size = np.where(judged, np.abs(smooth[:, j]), 0.0)
@@ -152,23 +173,47 @@ def torque_validation(log: ExperimentLog, motion: Reconstructed, arm: Arm, parts
         each = np.sqrt(np.bincount(at, size**2, minlength=len(labels)) / counts)
         place = int(np.argmax(each))
         k = int(np.argmax(np.where((at == place) & judged, size, -1.0)))
-        worst.append(Largest(j + 1, labels[place], float(each[place]), float(t[k]),
-                             float(smooth[k, j]), tuple(tip[k].tolist())))
+        worst.append(
+            Largest(
+                j + 1,
+                labels[place],
+                float(each[place]),
+                float(t[k]),
+                float(smooth[k, j]),
+                tuple(tip[k].tolist()),
+            )
+        )
     course = None
     if draw:
         rows = slice(None, None, max(1, -(-log.n_samples // CONFIG.points)))
         shown, model = np.where(known[:, None], log.tau, np.nan)[rows], parts.total[rows]
-        course = Course(t[rows], shown, model, residual=shown - model, tip=tip[rows],
-                        low_passed=np.where(judged[:, None], smooth, np.nan)[rows],
-                        **{name: getattr(parts, name)[rows] for name in PARTS})
+        course = Course(
+            t[rows],
+            shown,
+            model,
+            residual=shown - model,
+            tip=tip[rows],
+            low_passed=np.where(judged[:, None], smooth, np.nan)[rows],
+            **{name: getattr(parts, name)[rows] for name in PARTS},
+        )
     return TorqueValidation(
-        log.name, log.experiment, log.role,
-        "unknown" if log.controller is None else log.controller.law, int(known.sum()),
-        tuple(joint_unit("tau", joint.revolute) for joint in log.robot.joints), _rms(error),
-        _rms(measured), _ratio(_rms(error), _rms(measured)), cutoff,
+        log.name,
+        log.experiment,
+        log.role,
+        "unknown" if log.controller is None else log.controller.law,
+        int(known.sum()),
+        tuple(joint_unit("tau", joint.revolute) for joint in log.robot.joints),
+        _rms(error),
+        _rms(measured),
+        _ratio(_rms(error), _rms(measured)),
+        cutoff,
         _ratio(_rms(smooth[known]), whole),
-        {name: _rms(getattr(parts, name)[known]) for name in PARTS}, split, tuple(stretches),
-        tuple(worst), course)
+        {name: _rms(getattr(parts, name)[known]) for name in PARTS},
+        split,
+        tuple(stretches),
+        tuple(worst),
+        course,
+    )
 
 
 def _known(log: ExperimentLog, motion: Reconstructed) -> Mask:
@@ -238,19 +283,28 @@ def pooled(logs: Sequence[TorqueValidation]) -> TorqueError | None:
     if not some:
         return None
     counts = np.array([log.samples for log in some], dtype=float)[:, None]
-    error, whole = (np.sqrt((counts * np.array(x)**2).sum(axis=0) / counts.sum())
-                    for x in ([log.rms for log in some], [log.signal_rms for log in some]))
+    error, whole = (
+        np.sqrt((counts * np.array(x) ** 2).sum(axis=0) / counts.sum())
+        for x in ([log.rms for log in some], [log.signal_rms for log in some])
+    )
     return TorqueError(error, whole, _ratio(error, whole), "writing" if writing else "validate")
 
 
 Pair = tuple[ExperimentLog, Reconstructed]
 
 
-def control_cases(pairs: Sequence[Pair], parts: Sequence[ArmTorque], arm: Arm, simulate: bool,
-                  draws: int, seed: int) -> tuple[tuple[Case, ...], str, tuple[str, ...]]:
+def control_cases(
+    pairs: Sequence[Pair],
+    parts: Sequence[ArmTorque],
+    arm: Arm,
+    simulate: bool,
+    draws: int,
+    seed: int,
+) -> tuple[tuple[Case, ...], str, tuple[str, ...]]:
     """Return Table IV, why cases are missing, and the writing logs that do not compare."""
-    writing = [k for k, (log, _) in enumerate(pairs)
-               if log.experiment == "writing" and "q_ref" in log]
+    writing = [
+        k for k, (log, _) in enumerate(pairs) if log.experiment == "writing" and "q_ref" in log
+    ]
     if not writing:
         return (), "no log of experiment writing with a reference is among the held-out ones", ()
     first = min(writing, key=lambda k: case_of(pairs[k][0]) or len(CASES) + 1)
@@ -276,8 +330,10 @@ def control_cases(pairs: Sequence[Pair], parts: Sequence[ArmTorque], arm: Arm, s
 
 def simulated_task(pairs: Sequence[Pair], arm: Arm) -> tuple[Imitation | None, str]:
     """Simulate one task with the model, in closed loop where its log describes the controller."""
-    log = min((log for log, _ in pairs),
-              key=lambda log: (log.experiment != "writing", bool(why_not(recording(log)))))
+    log = min(
+        (log for log, _ in pairs),
+        key=lambda log: (log.experiment != "writing", bool(why_not(recording(log)))),
+    )
     try:
         file = f"logs/{slug(log.name)}-simulated"
         return imitate(log, arm, How(), file, {"model": arm.name}), ""
@@ -294,29 +350,48 @@ class Gates:
     cases: bool | None  # 2: case 6 is below case 1 in x, y and z
 
 
-def gates_of(torque: TorqueError | None, cases: Sequence[Case], limit: float,
-             robot: str) -> tuple[Gates, tuple[Check, ...]]:
+def gates_of(
+    torque: TorqueError | None, cases: Sequence[Case], limit: float, robot: str
+) -> tuple[Gates, tuple[Check, ...]]:
     """Judge the torque and the control cases; a warning for each gate that failed."""
     std = {one.case: one.tip_error_std.values for one in cases}
     better = None
     if {1, len(CASES)} <= set(std):
         better = all(full < alone for full, alone in zip(std[len(CASES)], std[1], strict=True))
-    gates = Gates(limit, None if torque is None else bool((torque.relative_error < limit).all()),
-                  better)
+    gates = Gates(
+        limit, None if torque is None else bool((torque.relative_error < limit).all()), better
+    )
     checks = []
     if torque is not None and gates.torque is False:
-        words = ", ".join(f"joint {j + 1} {100 * error:.3g} %"
-                          for j, error in enumerate(torque.relative_error) if not error < limit)
+        words = ", ".join(
+            f"joint {j + 1} {100 * error:.3g} %"
+            for j, error in enumerate(torque.relative_error)
+            if not error < limit
+        )
         where = "see in which stretches; then " if torque.of == "writing" else ""
-        checks.append(Check.of(
-            "D19", "warn", "the model misses the torque of held-out logs by more than "
-            f"{100 * limit:.3g} %: {words}", where=robot, gate=True,
-            remedy=f"{where}let 'rrrid diagnose' say what is missed, or fit to richer logs"))
+        checks.append(
+            Check.of(
+                "D19",
+                "warn",
+                "the model misses the torque of held-out logs by more than "
+                f"{100 * limit:.3g} %: {words}",
+                where=robot,
+                gate=True,
+                remedy=f"{where}let 'rrrid diagnose' say what is missed, or fit to richer logs",
+            )
+        )
     if gates.cases is False:
-        checks.append(Check.of(
-            "D20", "warn", "with the complete model ahead of the feedback the tip strays no less "
-            "than without, on some axis", where=robot, gate=True,
-            remedy="look at the split of the torque, and at its signs"))
+        checks.append(
+            Check.of(
+                "D20",
+                "warn",
+                "with the complete model ahead of the feedback the tip strays no less "
+                "than without, on some axis",
+                where=robot,
+                gate=True,
+                remedy="look at the split of the torque, and at its signs",
+            )
+        )
     return gates, tuple(checks)
 
 
@@ -340,5 +415,6 @@ class Result:
     design: Designed | None = None
     data_quality: tuple[Check, ...] = field(default=(), metadata=NOT_STORED, repr=False)
     derived: tuple[tuple[str, ExperimentLog], ...] = field(
-        default=(), metadata=NOT_STORED, repr=False)
+        default=(), metadata=NOT_STORED, repr=False
+    )
     table: ControllerTable | None = field(default=None, metadata=NOT_STORED, repr=False)

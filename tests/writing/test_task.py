@@ -12,9 +12,8 @@ import pytest
 from pipelines.errors import UsageError
 from pipelines.io.robot import RobotDescription
 from pipelines.io.robot_files import load_robot
-from pipelines.writing.inverse_kinematics import Elbow
 from pipelines.writing.path import Page
-from pipelines.writing.task import WritingReference, WritingTask, demands, writing_task
+from pipelines.writing.task import Elbow, WritingReference, WritingTask, demands, writing_task
 from sample_logs.make_model import synthetic_arm
 from tests.dynamics.serial_arms import ARMS
 from tests.writing.judge import TipJudge
