@@ -217,7 +217,7 @@ def _windowed(
         steps_of_time = np.diff(motion.t, append=motion.t[-1] + time)
         usable &= np.abs(steps_of_time - time) <= 0.5 * time
         whole = len(tau) // every * every
-        usable = usable[:whole].reshape(-1, every).all(axis=1)
+        usable = np.asarray(usable[:whole].reshape(-1, every).all(axis=1))
         tau = tau[:whole].reshape(len(usable), every, -1).mean(axis=1)
         some = slice(0, whole, every)
         motion = Motion(motion.t[some], motion.q[some], motion.dq[some], motion.ddq[some])

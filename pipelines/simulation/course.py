@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +48,7 @@ def course(
     first = np.arange(0, log.n_samples, size)
     middle = np.minimum(first + size // 2, log.n_samples - 1)
     t = np.stack([log.t[first], log.t[middle]], axis=1).ravel()
-    off, more = q[1] - q[0], dict[str, Array | None]()
+    off, more = q[1] - q[0], dict[str, Any]()
     if windows is not None:
         rows = windows.first[:, None] + np.arange(windows.length)
         more["elapsed"] = log.sample_time * np.arange(windows.length, dtype=np.float64)
@@ -60,7 +61,8 @@ def course(
         more |= {name: _envelope(x, size) for name, x in zip(names, (*tau, missed), strict=True)}
         if windows is None:
             more["torque_density"] = _spectrum(missed, log.sample_time)[1]
-    return Course(t, *(_envelope(x, size) for x in (*q, off, *dq)), **more)
+    first_five = [_envelope(x, size) for x in (*q, off, *dq)]
+    return Course(t, *first_five, **more)
 
 
 def _spectrum(x: Array, sample_time: float) -> tuple[Array, Array] | tuple[None, None]:

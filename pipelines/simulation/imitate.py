@@ -120,12 +120,13 @@ def imitate(
             if lacking.code != "RRID-S22" or log.origin == "planned":
                 raise
             reason = lacking.message
-    units = (
-        tuple(schema.joint_unit(name, kind) for kind in log.robot.revolute) for name in ("q", "tau")
-    )
+    kinds = log.robot.revolute
+    units = tuple(schema.joint_unit("q", kind) for kind in kinds)
+    torque = tuple(schema.joint_unit("tau", kind) for kind in kinds)
     law = "unknown" if log.controller is None else log.controller.law
     simulation, reason = ("windowed", reason) if experiment is None else ("closed-loop", "")
-    known = Imitation(log.name, log.source, (), simulation, reason, law, log.n_samples, 1, *units)
+    size = log.n_samples
+    known = Imitation(log.name, log.source, (), simulation, reason, law, size, 1, units, torque)
     if experiment is None:
         return _in_windows(log, bare, Plant.of(arm), how, known, draw)
     return _in_loop(log, bare, Plant.of(arm), experiment, how, known, (file, settings, draw))

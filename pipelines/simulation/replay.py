@@ -109,8 +109,8 @@ def _follow(
     moving, n = plant.prepared(len(first)), plant.n_joints
     integrator, t = RungeKutta(moving, sample_time, steps), motion.t[first].copy()
     begun = np.full_like(t, motion.t[0])  # memories count from the start of the log
-    seen = (np.ascontiguousarray(x[first].T) for x in (motion.q, motion.dq, motion.ddq))
-    state, states = moving.begin(t, *seen, begun)
+    q, dq, ddq = (np.ascontiguousarray(x[first].T) for x in (motion.q, motion.dq, motion.ddq))
+    state, states = moving.begin(t, q, dq, ddq, begun)
     out = np.empty((tau.shape[1], 2 * n, len(first)))
     for k in range(len(out)):
         out[k] = state

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.kinematics import serial_chain, tip_position
-from pipelines.errors import InputRejected, NothingMatched, RrridError
+from pipelines.errors import InputRejected, NothingMatched, RrridError, UsageError
 from pipelines.io.files import open_log, write_log
 from pipelines.io.log import ExperimentLog, digest_of
 from pipelines.io.model_file import Source, model_text, read_model, write_model
