@@ -611,10 +611,6 @@ def _shares(found: Boundary, truth: dict[str, Any]) -> dict[str, Any]:
     return {
         "share": gravity.share,
         "std": gravity.std,
-        "joint_share": list(zip(gravity.joint_share, gravity.joint_std, strict=True)),
-        "friction_share": list(
-            zip(friction.joint_share, friction.joint_std, truth["dissipated"], strict=False)
-        ),
         "why": [gravity.reason, friction.reason, found.direction.reason, found.order.reason],
     }
 
@@ -666,11 +662,8 @@ def table(results: Iterable[dict[str, Any]]) -> str:
     permuted = [r["order"] for r in rows if r["kind"] == "permuted" and "order" in r]
     lines.append(_rate("order right of permuted logs", permuted.count("right"), len(permuted)))
     healthy = [r for r in rows if "share" in r and r["fault"] == "healthy"]
-    with_gravity = [r for r in healthy if r["kind"] != "no gravity"]
     shares = {
         "gravity": [(r["share"], r["std"], r["kind"] != "no gravity") for r in healthy],
-        "each joint's gravity": [(*one, 1.0) for r in with_gravity for one in r["joint_share"]],
-        "each joint's friction": [one for r in healthy for one in r["friction_share"]],
     }
     for name, values in shares.items():
         inside = [abs(x - true) < 2 * std for x, std, true in values if x is not None]

@@ -16,8 +16,12 @@ from pipelines.dynamics.arm import Arm, ArmTorque
 from pipelines.dynamics.parameter import Uncertainty
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
 from pipelines.estimation.balance import power_balance
-from pipelines.estimation.checks.boundary import Boundary, torque_boundary
-from pipelines.estimation.checks.findings import boundary_findings, without_followers
+from pipelines.estimation.checks.boundary import (
+    Boundary,
+    boundary_findings,
+    torque_boundary,
+    without_followers,
+)
 from pipelines.estimation.checks.plausibility import mismatches
 from pipelines.estimation.consistency import consistency
 from pipelines.estimation.estimate import (
@@ -131,7 +135,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         settings.reconstruction.check(log.n_joints)
         refuse_unfit(settings, log)
     subjects, judging = _accepted(identify), _accepted(validate)
-    boundary, said_of_torque = _boundary(identify, _references(inputs), settings)
+    boundary, said_of_torque = _boundary(identify, settings)
     motions, said = _examined(identify, subjects, settings, said_of_torque)
     judges, said_too = _examined(validate, judging, settings, said_of_torque)
     even = for_equations((*motions, *judges))
@@ -188,15 +192,11 @@ def _accepted(logs: list[ExperimentLog]) -> list[tuple[Subject, list[Check]]]:
     return subjects
 
 
-def _references(inputs: Inputs) -> list[ExperimentLog]:
-    return [opened.log for opened in inputs.logs if opened.log.role == "reference"]
-
-
 def _boundary(
-    logs: list[ExperimentLog], references: list[ExperimentLog], settings: Settings
+    logs: list[ExperimentLog], settings: Settings
 ) -> tuple[Boundary | None, tuple[Check, ...]]:
     """Return what the torque of the logs is, and its findings where a mismatch is allowed."""
-    boundary = torque_boundary([recording(log) for log in (*logs, *references)])
+    boundary = torque_boundary([recording(log) for log in logs])
     findings = boundary_findings(boundary, logs[0].source or logs[0].name)
     if findings and not settings.skip_sanity_checks:
         raise _with_way_out(findings[0]).as_error()

@@ -17,8 +17,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import Check, Level, RrridError
-from pipelines.estimation.checks.boundary import Boundary, torque_boundary
-from pipelines.estimation.checks.findings import boundary_findings, without_followers
+from pipelines.estimation.checks.boundary import (
+    Boundary,
+    boundary_findings,
+    torque_boundary,
+    without_followers,
+)
 from pipelines.estimation.checks.plausibility import plausibility_findings
 from pipelines.io.files import Opened
 from pipelines.io.log import ExperimentLog, recording

@@ -81,7 +81,7 @@ def boundary_card(boundary: Boundary | None) -> tuple[Section, ...]:
     if boundary is None:
         return ()
     rows = [_sign(boundary), _gravity(boundary), _direction(boundary), _friction(boundary)]
-    rows += [_order(boundary), _unit(boundary), _payload(boundary)]
+    rows += [_order(boundary)]
     table = Table(
         ("quantity", "estimate ± standard deviation", "meaning"),
         tuple(row[:3] for row in rows),
@@ -117,13 +117,8 @@ def _number(value: float | None, std: float | None) -> str:
 
 def _gravity(boundary: Boundary) -> Row:
     share = boundary.gravity
-    joints = [
-        f"joint {j}: {_number(value, std)}"
-        for j, (value, std) in enumerate(zip(share.joint_share, share.joint_std, strict=True), 1)
-        if value is not None
-    ]
     tone: Tone = "bad" if boundary.without_gravity else "neutral"
-    meaning = sentence("boundary", "gravity", share, joints)
+    meaning = sentence("boundary", "gravity", share)
     return "share of gravity", _number(share.share, share.std), meaning, tone
 
 
@@ -151,19 +146,3 @@ def _order(boundary: Boundary) -> Row:
     if order.columns is not None and not order.signal:
         estimate += ", as logged"
     return "order of the joints", estimate, sentence("boundary", "order", order), tone
-
-
-def _unit(boundary: Boundary) -> Row:
-    unit = boundary.unit
-    names = ", ".join(dict.fromkeys(unit.units))
-    if unit.scale is None:
-        return "unit", names, f"Taken from the log: not identifiable, {unit.reason}.", "neutral"
-    scale = _number(unit.scale, unit.std)
-    return "unit", f"{names}, times {scale}", "1 where the described links are right.", "neutral"
-
-
-def _payload(boundary: Boundary) -> Row:
-    payload = boundary.payload
-    tone: Tone = "bad" if payload.present else "neutral"
-    meaning = sentence("boundary", "payload", payload)
-    return "compensated payload [kg]", _number(payload.mass, payload.std), meaning, tone

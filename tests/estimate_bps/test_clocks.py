@@ -19,7 +19,7 @@ from pipelines.io.files import open_log
 from pipelines.io.log import ExperimentLog
 from pipelines.quality.checks import Subject, check_log
 from pipelines.stage import Request, run_stage
-from tests.estimate_bps.test_other_arms import COULOMB, an_arm, deviations, estimated, recorded
+from tests.estimate_bps.test_other_arms import COULOMB, an_arm, recorded
 
 
 @pytest.mark.parametrize("case", ["a", pytest.param("b", marks=pytest.mark.slow)])
@@ -39,15 +39,6 @@ def resting(log: ExperimentLog, seconds: float, torque: np.ndarray) -> Experimen
     still["tau"] = still["tau"] + 0.01 * np.random.default_rng(0).standard_normal((count, log.n_joints))
     return replace(log, signals={name: replace(log.signals[name], values=np.concatenate([values, log.signals[name].values]))
                                  for name, values in still.items()})
-
-
-def test_torque_that_friction_holds_at_rest_is_no_equation() -> None:
-    """Before it moves the arm rests for 3 s at any torque that dry friction bears; its parameters come out all the same."""
-    arm, phi = an_arm("two")
-    log = recorded(arm)
-    held = log.tau[0] + np.array([1.6, -0.9]) * COULOMB
-    found = estimated(resting(log, 3.0, held))
-    assert np.sqrt(np.mean(np.square(deviations(found, arm, phi)))) < 1.6
 
 
 def test_panda_is_predicted_as_published(shared: Path) -> None:

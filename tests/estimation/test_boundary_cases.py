@@ -12,12 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.torque_boundary import case
 from pipelines import diagnose, estimate_bps, import_log, inspect
 from pipelines.errors import InputRejected
-from pipelines.estimation.checks.boundary import Boundary, torque_boundary
-from pipelines.estimation.checks.config import BoundaryConfig
-from pipelines.estimation.checks.findings import boundary_findings
+from pipelines.estimation.checks.boundary import Boundary, boundary_findings, torque_boundary
 from pipelines.estimation.checks.gravity_fit import GravityModel
 from pipelines.io.files import find_logs, open_log
 from pipelines.io.log import ExperimentLog, Signal
@@ -216,7 +213,7 @@ def test_a_recorded_arm_has_a_boundary_without_a_finding(robot: str, shared: Pat
     found = boundary_of(shared / "real" / robot / "logs")
     assert boundary_findings(found, robot) == ()
     assert found.sign == "signed"
-    assert found.order.columns == tuple(range(1, len(found.unit.units) + 1))
+    assert found.order.columns == tuple(range(1, len(found.order.columns or ()) + 1))
     share, std = found.gravity.share, found.gravity.std
     assert share is None or (std is not None and abs(share - 1.0) < 2.0 * std < 0.2)
 
@@ -263,47 +260,7 @@ def test_gravity_that_explains_no_more_than_a_model_errs_has_no_share(
     """Case 46: 0.73 % of the torque is left with gravity, and 0.74 % without."""
     found = boundary_of(imported_by(shared / PANDA, tmp_path))
     assert (found.gravity.present, found.gravity.share) == (None, None)
-    assert found.gravity.joint_share == ()
     assert "not identifiable" in found.gravity.reason
-
-
-def test_a_joint_whose_axis_is_along_gravity_carries_none(shared: Path, tmp_path: Path) -> None:
-    """Joint 1 of case 46, though another gravity vector than the described one fits a little better."""
-    paths, _ = find_logs([imported_by(shared / PANDA, tmp_path)])
-    logs = [open_log(path).log for path in paths]
-    found = torque_boundary(logs, replace(BoundaryConfig(), suspect=0.0))
-    assert found is not None
-    assert found.gravity.present
-    assert found.gravity.joint_share[0] is None
-
-
-@pytest.mark.parametrize("log", ["stale samples", "eight seconds"])
-def test_the_scale_of_a_torque_in_newton_metres_is_one_within_its_deviation(
-    log: str, shared: Path, tmp_path: Path
-) -> None:
-    """Case 47, whose rows are stored twice, and a short log whose size of gravity is not known well."""
-    if log == "stale samples":
-        recipe = shared / "cases" / "47-stale-samples" / "r.toml"
-        found = boundary_of(imported_by(recipe, tmp_path))
-    else:
-        whole, _ = case(95002, "whole")
-        short = whole.t < 8.0
-        signals = {k: replace(one, values=one.values[short]) for k, one in whole.signals.items()}
-        told = torque_boundary([replace(whole, signals=signals)])
-        assert told is not None
-        found = told
-    assert found.unit.scale is not None
-    assert found.unit.std is not None
-    assert abs(found.unit.scale - 1.0) < 2.0 * found.unit.std < 0.05
-
-
-def test_the_scale_of_a_torque_whose_gravity_is_half_compensated_is_that_of_its_inertia() -> None:
-    whole, none = (case(95015, kind)[0] for kind in ("whole", "no gravity"))
-    half = Signal(0.5 * (whole.tau + none.tau), "N m", "torque")
-    found = torque_boundary([replace(whole, signals={**whole.signals, "tau": half})])
-    assert found is not None
-    assert found.gravity.share == pytest.approx(0.5, abs=0.01)
-    assert found.unit.scale == pytest.approx(1.0, abs=0.01)
 
 
 def test_the_card_tells_what_a_share_of_friction_is_a_share_of(shared: Path) -> None:

@@ -7,9 +7,8 @@ import pytest
 
 from benchmarks.other_plants.drawn import drawn
 from benchmarks.torque_boundary import KINDS, judged
-from pipelines.estimation.checks.boundary import torque_boundary
+from pipelines.estimation.checks.boundary import torque_boundary, touches_of_zero
 from pipelines.estimation.checks.config import BoundaryConfig
-from pipelines.estimation.checks.torque_sign import _touches
 from tests.seeds import rarely, usually
 
 SEEDS = (pytest.param(103, marks=pytest.mark.slow), 108)
@@ -60,7 +59,7 @@ def test_a_weight_that_is_lowered_fast_is_no_magnitude(least: float) -> None:
     course, q, noise = np.cos(2.0 * np.pi * t), np.sin(2.0 * np.pi * t), 2.0 * rng.standard_normal(len(t))
     config = BoundaryConfig()
     weight = 30.0 + least + 30.0 * course + noise
-    assert (_touches([(weight, q)], config) or 0) < config.touches
-    reflected = _touches([(np.abs(30.0 * course + noise), q)], config)
+    assert (touches_of_zero([(weight, q)], config) or 0) < config.touches
+    reflected = touches_of_zero([(np.abs(30.0 * course + noise), q)], config)
     assert reflected is not None
     assert reflected >= config.touches

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.rrr import rigid_body
-from pipelines.estimation.checks.joint_rows import Evidence, sample_motion
+from pipelines.estimation.checks.joint_rows import sample_motion
+from pipelines.estimation.checks.plausibility import Evidence, plausibility, torque_scale
 from pipelines.estimation.checks.plausibility import _against_the_others as against_the_others
-from pipelines.estimation.checks.plausibility import plausibility
-from pipelines.estimation.checks.torque_scale import torque_scale
 from pipelines.io.files import open_log
 from pipelines.io.log import ExperimentLog
 from pipelines.quality.checks import Subject

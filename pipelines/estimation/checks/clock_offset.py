@@ -6,9 +6,8 @@ the answer is, and their trend is the drift. A delay of one joint alone makes sc
 offset: a clock is common to all.
 
 Friction lags as well: after a reversal it comes to its level over a presliding distance
-(Armstrong-Hélouvry, Dupont & Canudas de Wit 1994), and where all joints have gears alike, it lags
-alike in all of them. It does so near reversals alone, a clock everywhere. So an offset is accepted
-only where the rest of the motion shows it too (`away_from_reversals`).
+(Armstrong-Hélouvry, Dupont & Canudas de Wit 1994). It does so near reversals alone, a clock
+everywhere. So an offset is accepted only where the rest of the motion shows it too.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.dynamics.body import RigidBody
-from pipelines.estimation.checks.joint_rows import Row, Sampled, factorised, row_columns
+from pipelines.estimation.checks.joint_rows import Row, Sampled, row_fits
 from pipelines.estimation.config import PlausibilityConfig
 from pipelines.io.log import Array
 
@@ -61,15 +60,14 @@ def away_from_reversals(
             sides = (turn[np.maximum(after - 1, 0)], turn[np.minimum(after, turn.size - 1)])
             near = np.min([np.abs(motion.t - side) for side in sides], axis=0)
             keep[near < reach, j] = 0.0
-    columns = [row_columns(body, motion, j) for j in range(motion.dq.shape[1])]
-    if min(keep[:, j].sum() for j in joints) < _CONFIG.moments * columns[0].shape[1]:
+    rows = row_fits(body, motion, keep)
+    if min(keep[:, j].sum() for j in joints) < _CONFIG.moments * len(rows[0].solve):
         return None
-    rows = tuple(factorised(keep[:, j, None] * table) for j, table in enumerate(columns))
     return clock_offset(rows, motion, joints, keep)
 
 
 def clock_offset(
-    rows: tuple[Row, ...],
+    rows: Sequence[Row],
     motion: Sampled,
     joints: Sequence[int] | None = None,
     keep: Array | None = None,
@@ -78,7 +76,7 @@ def clock_offset(
 
     Args:
         joints: those that are used (from 0); all of them by default.
-        keep: (moments, joints) 1 where a moment counts in a joint's row, 0 where the row is zero.
+        keep: as in `row_fits`.
     """
     joints = range(len(rows)) if joints is None else joints
     keep = np.ones_like(motion.dq) if keep is None else keep
@@ -100,31 +98,23 @@ def clock_offset(
         return None
     middle = np.array([float(part.mean()) for part in np.array_split(time, _BLOCKS)]) / span
     for _ in range(_ROUNDS):
-        number, weight = _steps(rows, motion, offset + drift * time / span, timed, keep)
-        step, bound = _line(number, weight, middle)
+        steps, weight = np.zeros((2, _BLOCKS, len(timed)))  # [samples], and 1 / their variance
+        at = offset + drift * time / span
+        tau = keep * motion.shifted(at)
+        slope = 0.5 * keep * (motion.shifted(at + 1.0) - motion.shifted(at - 1.0))
+        for place, j in enumerate(timed):
+            rest, turn = rows[j].residual(tau[:, j]), rows[j].residual(slope[:, j])
+            variance = max(float(rest @ rest) / len(rest), 1e-300)
+            for b, part in enumerate(np.array_split(np.arange(len(rest)), _BLOCKS)):
+                power = float(turn[part] @ turn[part])
+                if power > 0:
+                    steps[b, place] = -float(rest[part] @ turn[part]) / power
+                    weight[b, place] = power / variance
+        step, bound = _line(steps, weight, middle)
         offset, drift = offset + float(step[0]), drift + float(step[1])
         if np.abs(step).sum() < 1e-3:
             break
     return Offset(offset, float(bound[0]), drift, float(bound[1]), len(timed))
-
-
-def _steps(
-    rows: tuple[Row, ...], motion: Sampled, offset: Array | float, joints: list[int], keep: Array
-) -> tuple[Array, Array]:
-    """Return the step [samples] of each block and joint, and its weight (inverse variance)."""
-    tau = keep * motion.shifted(offset)
-    slope = 0.5 * keep * (motion.shifted(offset + 1.0) - motion.shifted(offset - 1.0))
-    number, weight = np.zeros((_BLOCKS, len(joints))), np.zeros((_BLOCKS, len(joints)))
-    for place, j in enumerate(joints):
-        rest, turn = rows[j].residual(tau[:, j]), rows[j].residual(slope[:, j])
-        variance = float(rest @ rest) / len(rest)
-        parts = (np.array_split(x, _BLOCKS) for x in (rest, turn))
-        for b, (r, s) in enumerate(zip(*parts, strict=True)):
-            power = float(s @ s)
-            if power > 0:
-                number[b, place] = -float(r @ s) / power
-                weight[b, place] = power / max(variance, 1e-300)
-    return number, weight
 
 
 def _line(number: Array, weight: Array, middle: Array) -> tuple[Array, Array]:
@@ -135,14 +125,12 @@ def _line(number: Array, weight: Array, middle: Array) -> tuple[Array, Array]:
     inverse = np.linalg.pinv(normal.sum(axis=0))
     line = inverse @ right.sum(axis=0)
     rest = weight * (number - (design @ line)[:, None]) ** 2
-    freedom = max(1, number.size - 2)
-    covariance = inverse * max(float(rest.sum()) / freedom, 1.0)
-    bound = 3.0 * np.sqrt(np.diag(covariance))
-    joints = number.shape[1]
+    freedom, joints = max(1, number.size - 2), number.shape[1]
+    bound = 3.0 * np.sqrt(np.diag(inverse) * max(float(rest.sum()) / freedom, 1.0))
     if joints > 1:
-        each = np.linalg.pinv(normal) @ right[..., None]
+        each = (np.linalg.pinv(normal) @ right[..., None])[..., 0]
         share = np.einsum("jkk->jk", normal)
         share = share / share.sum(axis=0)
-        between = np.sum(share * (each[..., 0] - line) ** 2, axis=0) / (joints - 1)
+        between = np.sum(share * (each - line) ** 2, axis=0) / (joints - 1)
         bound = bound + _STUDENT[min(joints - 1, len(_STUDENT) - 1)] * np.sqrt(between)
     return line, bound

@@ -14,6 +14,7 @@ class BoundaryConfig:
     Attributes:
         order_rows: moments with which orders of the columns are compared.
         orders: other orders that are fitted in full.
+        few: joints that move, up to which every order is tried.
         model_error: of a torque's RMS, the resolution of good torque sensors: smaller residuals
             are no evidence for one model against another.
         decisive: gain in log likelihood that decides between two models, after the residual's
@@ -33,14 +34,8 @@ class BoundaryConfig:
             data, above which its size is not identifiable.
         direction_std: [rad] 2.5 degrees: standard deviation of a direction, above which it is not
             identifiable: two of them are 5 degrees.
-        weighs: of its torque's RMS: a joint with less gravity has no share of its own.
         friction_absent: of torque times speed, both RMS: less is what compensation leaves, or a
             direct drive; geared drives have 10 to 50 %.
-        described: relative error of described links, up to which they show a payload.
-        doubt: difference in log likelihood, below which an error of described links is allowed: two
-            deviations.
-        payload_deviations: standard deviations by which a mass that is subtracted differs from 0.
-        payload_share: of the torque's RMS, that a payload makes which is looked for.
         no_negative: times the noise of a channel: a torque below minus that is negative.
         touches: times that a signed torque does not come down to zero without crossing it once.
         near: of the RMS: a torque at zero.
@@ -59,6 +54,7 @@ class BoundaryConfig:
 
     order_rows: int = 600
     orders: int = 12
+    few: int = 4
     model_error: float = 0.003
     decisive: float = 10.0
     alike: float = 5.0
@@ -70,12 +66,7 @@ class BoundaryConfig:
     undetermined: float = 0.25
     wide: float = 2.0
     direction_std: float = 0.0436
-    weighs: float = 0.1
     friction_absent: float = 0.02
-    described: float = 0.05
-    doubt: float = 2.0
-    payload_deviations: float = 4.0
-    payload_share: float = 0.05
     no_negative: float = 3.0
     touches: int = 3
     near: float = 0.03

@@ -9,8 +9,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from pipelines.errors import Check, InputRejected, NothingMatched
-from pipelines.estimation.checks.boundary import Boundary, torque_boundary
-from pipelines.estimation.checks.findings import boundary_findings, without_followers
+from pipelines.estimation.checks.boundary import (
+    Boundary,
+    boundary_findings,
+    torque_boundary,
+    without_followers,
+)
 from pipelines.estimation.checks.plausibility import mismatches
 from pipelines.estimation.preparation import Logs
 from pipelines.io.log import ExperimentLog, recording

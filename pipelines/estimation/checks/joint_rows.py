@@ -1,14 +1,14 @@
-"""Fit each joint's torque by its own row of the rigid body, so that others can be tried on it.
+"""Sample the motion of a log, and fit each joint's torque by its row of the rigid body.
 
-One factorisation a joint, A_j = U S Vᵀ; any right-hand side τ then costs U (Uᵀ τ). The columns of a
-row are those of the rigid body, the rotor's inertia, Coulomb and viscous friction and an offset:
-what any healthy arm may have.
+The columns of a row are those of the rigid body, the rotor's inertia, Coulomb and viscous friction
+and an offset: what any healthy arm may have. A row by itself takes any parameters; rows together
+share those of the rigid body.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -18,10 +18,9 @@ from pipelines.estimation.filters import apply_kernel, half_width, kernel, local
 from pipelines.estimation.least_squares import Indices
 from pipelines.io.log import Array
 from pipelines.quality.segments import Mask, Usable
-from pipelines.quality.subject import Subject
 
 _CONFIG = PlausibilityConfig()
-_RANK = 1e-7  # numerics: singular values below this share, of equilibrated columns, are rounding
+_RANK = 1e-10  # numerics: of the largest eigenvalue, of equilibrated columns: less is rounding
 
 
 @dataclass(frozen=True)
@@ -120,8 +119,8 @@ def _filled(grid: Array, t: Array, x: Array, spoilt: Mask) -> Array:
 class Row:
     """One joint's columns, factorised."""
 
-    basis: Array  # U (moments, rank)
-    solve: Array  # (columns, rank): coefficients = solve @ Uᵀ τ
+    basis: Array  # (moments, rank) orthonormal
+    solve: Array  # (columns, rank): coefficients = solve @ basisᵀ τ
 
     def residual(self, tau: Array) -> Array:
         """Return what the columns cannot explain of any right-hand sides (moments, ...)."""
@@ -135,113 +134,76 @@ class Row:
         return self.solve @ (self.basis.T @ tau), variance * self.solve @ self.solve.T
 
 
-def row_columns(
-    body: RigidBody, motion: Sampled, joint: int, regressor: Array | None = None
-) -> Array:
-    """Return the columns (moments, columns) of one joint's torque."""
-    if regressor is None:
-        regressor = body.regressor(motion.q, motion.dq, motion.ddq)
-    own = (motion.ddq, motion.dq, motion.coulomb, np.ones_like(motion.q))
-    return np.concatenate([regressor[:, joint], *(x[:, joint, None] for x in own)], axis=1)
+def row_fits(body: RigidBody, motion: Sampled, keep: Array | None = None) -> tuple[Row, ...]:
+    """Return every joint's row; dependent columns get the smallest coefficients that fit.
+
+    Args:
+        keep: (moments, joints) 1 where a moment counts in a joint's row, 0 where the row is zero.
+    """
+    regressor, rows = body.regressor(motion.q, motion.dq, motion.ddq), []
+    for j in range(motion.q.shape[1]):
+        columns = np.hstack([regressor[:, j], _own(motion, j)])
+        if keep is not None:
+            columns = keep[:, j, None] * columns
+        scale = np.linalg.norm(columns, axis=0)
+        weight = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 1e-12 * scale.max())
+        unit = columns * weight
+        values, vectors = np.linalg.eigh(unit.T @ unit)
+        seen = values > _RANK * max(float(values[-1]), 1e-300)
+        turn = vectors[:, seen] / np.sqrt(values[seen])
+        rows.append(Row(unit @ turn, weight[:, None] * turn))
+    return tuple(rows)
 
 
-def factorised(columns: Array) -> Row:
-    """Return the row of these columns; dependent ones get the smallest coefficients that fit."""
-    scale = np.linalg.norm(columns, axis=0)
-    seen = scale > 1e-12 * max(float(scale.max(initial=0.0)), 1e-300)
-    weight = np.where(seen, 1.0 / np.where(seen, scale, 1.0), 0.0)
-    u, s, vt = np.linalg.svd(columns * weight, full_matrices=False)
-    rank = int(np.sum(s > _RANK * s[0])) if s.size and s[0] > 0 else 0
-    return Row(u[:, :rank], weight[:, None] * vt[:rank].T / s[:rank])
+def _own(motion: Sampled, j: int) -> Array:
+    """Return what a joint has for itself (moments, 4): rotor inertia, friction and an offset."""
+    parts = (motion.ddq[:, j], motion.dq[:, j], motion.coulomb[:, j], np.ones(len(motion.t)))
+    return np.stack(parts, axis=-1)
 
 
-def row_fits(body: RigidBody, motion: Sampled) -> tuple[Row, ...]:
-    """Return every joint's row."""
-    regressor = body.regressor(motion.q, motion.dq, motion.ddq)
-    joints = range(motion.q.shape[1])
-    return tuple(factorised(row_columns(body, motion, j, regressor)) for j in joints)
-
-
-def relative_residual(rows: tuple[Row, ...], tau: Array) -> Array:
+def relative_residual(rows: Sequence[Row], tau: Array) -> Array:
     """(rows, torques) what of each torque's variation each joint's row cannot explain, 0 … 1."""
     size = np.linalg.norm(tau - tau.mean(axis=0), axis=0)
     size = np.where(size > 0, size, 1.0)
     return np.stack([np.linalg.norm(row.residual(tau), axis=0) / size for row in rows])
 
 
-def quick_residual(body: RigidBody, motion: Sampled) -> Array:
-    """Return `relative_residual` by normal equations: to 1e-4, and ten times faster."""
-    regressor, tau = body.regressor(motion.q, motion.dq, motion.ddq), motion.tau
-    power = np.sum((tau - tau.mean(axis=0)) ** 2, axis=0)
-    left = []
-    for j in range(tau.shape[1]):
-        columns = row_columns(body, motion, j, regressor)
-        scale = np.linalg.norm(columns, axis=0)
-        columns = columns / np.where(scale > 0, scale, 1.0)
-        values, vectors = np.linalg.eigh(columns.T @ columns)
-        seen = values > 1e-10 * values[-1]
-        along = vectors[:, seen].T @ (columns.T @ tau)
-        left.append(np.sum(tau**2, axis=0) - np.sum(along**2 / values[seen, None], axis=0))
-    return np.asarray(np.sqrt(np.maximum(left, 0.0) / np.where(power > 0, power, 1.0)))
-
-
-def shared_residual(body: RigidBody, motion: Sampled) -> Array:
-    """(joints,) what is left of each torque's variation when all rows share rigid parameters.
-
-    A row by itself takes a wrong scale of a speed for another inertia; together they cannot: in the
-    row of the joint itself inertia takes the inverse of the scale, in the rows of the others, by
-    the centrifugal torque, its square.
+@dataclass(frozen=True)
+class SharedRows:
+    """Rows that share the rigid body's parameters, each over its torque's size, its own columns
+    taken out. A row by itself takes a wrong scale for other parameters; together they cannot.
     """
-    q, n = motion.q, motion.tau.shape[1]
-    size = np.linalg.norm(motion.tau - motion.tau.mean(axis=0), axis=0)
-    size = np.where(size > 0, size, 1.0)
-    each = np.stack([motion.ddq, motion.dq, motion.coulomb, np.ones_like(q)], axis=-1)
-    own = np.einsum("mjc,jk->mjkc", each, np.eye(n)).reshape(len(q), n, -1)
-    rigid = body.regressor(q, motion.dq, motion.ddq)
-    flat = (np.concatenate([rigid, own], axis=2) / size[:, None]).reshape(len(q) * n, -1)
-    scale = np.linalg.norm(flat, axis=0)
-    flat = flat / np.where(scale > 0, scale, 1.0)
-    tau = (motion.tau / size).ravel()
-    left = tau - flat @ np.linalg.lstsq(flat, tau, rcond=_RANK)[0]
-    return np.asarray(np.linalg.norm(left.reshape(-1, n), axis=0))
 
+    gram: Array  # (joints, parameters, parameters)
+    side: Array  # (joints, parameters)
+    square: Array  # (joints,)
 
-@dataclass(frozen=True, eq=False)
-class Evidence:
-    """The rows of one log, computed once for all questions."""
+    @classmethod
+    def of(cls, body: RigidBody, motion: Sampled, joints: Sequence[int]) -> SharedRows:
+        regressor, tau = body.regressor(motion.q, motion.dq, motion.ddq), motion.tau
+        scale = np.sqrt(np.sum(regressor**2, axis=(0, 1)))
+        regressor = regressor / np.where(scale > 0.0, scale, 1.0)
+        parts = []
+        for j in joints:
+            own = _own(motion, j)
+            own, _ = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))
+            size = float(np.linalg.norm(tau[:, j] - tau[:, j].mean())) or 1.0
+            whole = np.column_stack([regressor[:, j], tau[:, j]]) / size
+            whole -= own @ (own.T @ whole)
+            parts.append(whole.T @ whole)
+        gram = np.array(parts)
+        return cls(gram[:, :-1, :-1], gram[:, :-1, -1], gram[:, -1, -1])
 
-    subject: Subject
-    body: RigidBody
-    motion: Sampled
+    def left(self, factors: Array) -> Array:
+        """Return the relative residual (joints,) if torque j is `factors` j times what it seems.
 
-    @cached_property
-    def rows(self) -> tuple[Row, ...]:
-        return row_fits(self.body, self.motion)
-
-    @cached_property
-    def table(self) -> Array:
-        """(rows, torques) relative residual of every torque on every joint's row."""
-        return relative_residual(self.rows, self.motion.tau)
-
-    @property
-    def residual(self) -> Array:
-        return np.diag(self.table)
-
-    @cached_property
-    def telling(self) -> Indices:
-        """The joints (from 0) whose row can tell anything: those that move.
-
-        A joint that is held sways within its dry friction, of which no row knows, while the moving
-        joints' motion is in every row: another joint's row may explain its torque better.
+        min over β of Σ_j |τ_j - f_j Φ_j β|²
         """
-        travel = self.subject.travel
-        return np.flatnonzero(travel >= _CONFIG.held * travel.max())
-
-    @property
-    def n_joints(self) -> int:
-        return int(self.motion.q.shape[1])
-
-    def thinned(self) -> Evidence:
-        """Return fewer moments, for questions that need a new factorisation each."""
-        most = 5 * max(row.basis.shape[1] for row in self.rows)
-        return replace(self, motion=self.motion.every(max(1, len(self.motion.t) // most)))
+        gram, side = np.einsum("j,jab->ab", factors**2, self.gram), factors @ self.side
+        size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        values, vectors = np.linalg.eigh(gram / size / size[:, None])
+        seen = values > 1e-12 * values[-1] * len(values)
+        beta = (vectors[:, seen] / values[seen]) @ (vectors[:, seen].T @ (side / size)) / size
+        rest = self.square - 2.0 * factors * (self.side @ beta)
+        rest += factors**2 * np.einsum("a,jab,b->j", beta, self.gram, beta)
+        return np.asarray(np.sqrt(np.maximum(rest, 0.0)))

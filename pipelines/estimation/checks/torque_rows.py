@@ -32,17 +32,14 @@ __all__ = [
     "CLUSTERS",
     "Array",
     "GenericArm",
-    "Order",
     "RowFilter",
     "TorqueRows",
     "generic_arm",
     "own_columns",
-    "thinned",
     "torque_rows",
 ]
 
 Array = npt.NDArray[np.float64]
-Order = tuple[int, ...]
 
 _ELSEWHERE = np.array([3.1, -5.3, 7.7])  # [m/s^2] along no axis: shows all that any gravity shows
 _SEED = 20040509  # numerics
@@ -90,8 +87,8 @@ def generic_arm(robot: RobotDescription) -> GenericArm:
 def torque_rows(
     arm: GenericArm,
     motions: Sequence[Sampled],
-    q_order: Order | None = None,
-    tau_order: Order | None = None,
+    q_order: Sequence[int] | None = None,
+    tau_order: Sequence[int] | None = None,
 ) -> TorqueRows:
     """Return the rows of `motions`, joint j of the arm taking column order[j] of the logs.
 
@@ -150,16 +147,6 @@ def own_columns(dq: Array, ddq: Array, coulomb: Array) -> Array:
         dq * np.abs(dq),
     ]
     return np.stack([ddq, *laws, np.ones_like(dq)], axis=-1).transpose(1, 0, 2)
-
-
-def thinned(motions: Sequence[Sampled], moments: int) -> list[Sampled]:
-    """Return `motions` at every k-th moment, about `moments` of all together."""
-    step = max(1, sum(len(motion.t) for motion in motions) // moments)
-    names = ("t", "q", "dq", "ddq", "coulomb", "at")
-    return [
-        replace(motion, **{name: getattr(motion, name)[::step] for name in names})
-        for motion in motions
-    ]
 
 
 def _load(slow: Array, own: Array, torque: Array, rigid: Array) -> Array:
