@@ -471,7 +471,8 @@ def _slopes(e: Evidence, known: Array, angles: float = 1.0) -> dict[int, float]:
 def _unexplained(columns: Array, tau: Array) -> tuple[float, Array]:
     """Return the share of the variation of `tau` that `columns` leave, and their numbers."""
     fit = np.linalg.lstsq(columns, tau, rcond=None)[0]
-    return float(np.linalg.norm(tau - columns @ fit) / np.linalg.norm(tau - tau.mean())), fit
+    left = float(np.linalg.norm(tau - columns @ fit) / np.linalg.norm(tau - tau.mean()))
+    return left, np.asarray(fit, dtype=np.float64)
 
 
 def _far(slopes: dict[int, float]) -> dict[int, float]:
