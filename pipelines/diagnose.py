@@ -31,7 +31,7 @@ from pipelines.estimation.preparation import BLOCKS, Logs, prepare
 from pipelines.io.model_file import read_model
 from pipelines.io.option import option
 from pipelines.report.diagnosis_report import diagnosis_report
-from pipelines.report.finding_words import summary_of
+from pipelines.report.finding_words import headlines
 from pipelines.report.report import Report
 from pipelines.stage import Beside, Inputs, Request, Stage, read_logs
 
@@ -155,7 +155,7 @@ def compute(inputs: Inputs, settings: Settings, whole: bool = True) -> Result:
     found, extension = _diagnosed(chosen, settings, given, whole)
     found = replace(_beside_clocks(found, said), boundary=boundary)
     robot = chosen.identify[0].robot
-    return Result(
+    result = Result(
         **{f.name: getattr(found, f.name) for f in fields(found)},
         robot=chosen.identify[0].robot_name,
         joints=tuple(joint.name for joint in robot.joints),
@@ -167,6 +167,7 @@ def compute(inputs: Inputs, settings: Settings, whole: bool = True) -> Result:
         if given.arm is None or not given.arm.friction
         else Path(settings.model or "").name,
     )
+    return replace(result, summary=" ".join(headlines(result)))
 
 
 def _diagnosed(
@@ -180,7 +181,6 @@ def _diagnosed(
     given.tell("comparing with the reference logs" if logs.reference else "looking for causes")
     found = diagnose_prepared(prepared, config, settings.exclude)
     told, extension = answer(prepared, found, given.tell, settings.blocks, whole, settings.exclude)
-    told = replace(told, summary=summary_of(told))
     return _with_cut(told, found.look.selection.cut, settings.max_causes), extension
 
 
@@ -194,11 +194,7 @@ def _with_cut(found: Diagnosis, cut: Sequence[tuple[str, int | None]], most: int
         f"the search ended at {most} cause{'s' if most > 1 else ''} (--max-causes {most}); "
         f"still significant: {', '.join(places)}{more}"
     )
-    return replace(
-        found,
-        reason=f"{found.reason}; {words}" if found.reason else words,
-        summary=f"{found.summary} T{words[1:]}.",
-    )
+    return replace(found, reason=f"{found.reason}; {words}" if found.reason else words)
 
 
 def _beside_clocks(found: Diagnosis, said: Sequence[Check]) -> Diagnosis:
@@ -207,11 +203,7 @@ def _beside_clocks(found: Diagnosis, said: Sequence[Check]) -> Diagnosis:
     if found.verdict not in ("no-fault-found", "cannot-judge") or late is None:
         return found
     words = f"in {Path(late.where.partition(',')[0]).name} {late.message}"
-    return replace(
-        found,
-        reason=f"{found.reason}; {words}" if found.reason else words,
-        summary=f"{found.summary.rstrip('.')}; but {words}.",
-    )
+    return replace(found, reason=f"{found.reason}; {words}" if found.reason else words)
 
 
 def _refuse_strange(settings: Settings) -> None:

@@ -94,7 +94,7 @@ class Answer(Generic[R]):
     @property
     def summary(self) -> str:
         """The verdict in one line."""
-        return self.found.report.verdict
+        return self.found.report.verdict.replace("\n", " ")
 
     @property
     def logs(self) -> tuple[ExperimentLog, ...]:

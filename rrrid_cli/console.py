@@ -93,7 +93,7 @@ def print_outcome(outcome: Outcome[Any], options: Common) -> None:
     print_verdict(outcome.report, stream)
     if outcome.report.key_figures is not None:
         _print_key_figures(outcome.report.key_figures, stream)
-    for line in outcome.report.basis:
+    for line in outcome.report.basis if options.verbose else ():
         print(f"  {clean(line, 400)}", file=stream)
     print_checks(outcome.checks, options.verbose, stream)
     report = outcome.folder / "report.html"
@@ -102,7 +102,7 @@ def print_outcome(outcome: Outcome[Any], options: Common) -> None:
 
 def print_verdict(report: Report, stream: TextIO | None = None) -> None:
     """Print the verdict, and what to look at on the machine."""
-    for line in (report.verdict, *report.advice):
+    for line in (*report.verdict.split("\n"), *report.advice):
         print(clean(line, None), file=stream)
 
 

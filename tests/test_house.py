@@ -15,7 +15,7 @@ REPO = Path(__file__).resolve().parents[1]
 # Areas not yet moved to the layout of the design: the list only shrinks, and so does each number.
 CONSTANTS = {
     "pipelines/diagnose.py": 1, "pipelines/diagnosis": 9,
-    "pipelines/report": 62,
+    "pipelines/report": 60,
 }
 
 

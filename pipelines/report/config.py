@@ -17,8 +17,7 @@ class ReportConfig:
     reconstructed: int = 8  # logs whose motion is drawn
     simulated: int = 4  # logs whose simulation is drawn
     inputs: int = 40  # at the foot of a page
-    told: int = 2  # further findings in the sentence of a diagnosis
-    vague: float = 5.0  # deviations, within which that sentence shows the deviation
+    headline: int = 240  # characters of a cause's line, of which the next action may be left out
     fault_numbers: int = 3  # of a finding that `demo` tells, where it hid another
 
 

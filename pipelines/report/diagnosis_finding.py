@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.diagnosis.result import Answer, Finding, Gain, ResidualRms, TipError
+from pipelines.diagnosis.result import Answer, Finding, Gain, ResidualRms
 from pipelines.dynamics.parameter_names import numbered
 from pipelines.effects import find_effect
 from pipelines.estimation.residual_analysis import Proof
@@ -231,14 +230,8 @@ def gain_table(gain: Gain, caption: str, units: Units = _TURNING) -> Table:
     return Table(columns, tuple(rows), f"{caption}{simulated}")
 
 
-def tip_change(gain: Gain) -> str:
-    """ "the simulated tip is 1.17 mm off the measured one instead of 1.22 mm, over the first 5 s of
-    writing-1"; empty where no digit changes."""
-    return _say("tip_change", gain, *_tip(gain), span_words(gain))
-
-
 def tip_worth(gain: Gain) -> str:
-    """The same as a sentence, with how the tip was simulated, whether it changes or not."""
+    """Return the simulated tip error before and after, and how the tip was simulated."""
     return _say("tip_worth", gain, *_tip(gain), span_words(gain))
 
 
@@ -250,24 +243,6 @@ def span_words(gain: Gain) -> str:
         logs.setdefault(f"{first}{format_number(one.seconds, 3)} s of ", []).append(one.log)
     parts = " and ".join(f"{seconds}{' and '.join(names)}" for seconds, names in logs.items())
     return f"over {parts}" if parts else ""
-
-
-def all_together(findings: Sequence[Finding]) -> Gain:
-    """The gain of the first, with the simulated tip before any of them and after all.
-
-    As it is where they do not follow each other: none is before the first or after the last.
-    """
-    first = findings[0].gain
-    tips = [one.gain.tip_error_rms for one in findings]
-    known = [tip for tip in tips if tip is not None]
-    ways = {(one.gain.simulation, one.gain.simulated_span) for one in findings}
-    if len(findings) == 1 or len(known) < len(tips) or len(ways) > 1:
-        return first
-    starts, ends = {tip.before for tip in known}, {tip.after for tip in known}
-    before, after = starts - ends, ends - starts
-    if len(before) != 1 or len(after) != 1:
-        return first
-    return replace(first, tip_error_rms=TipError(before.pop(), after.pop()))
 
 
 def _tip(gain: Gain) -> tuple[str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -13,7 +14,6 @@ from pipelines.diagnosis.result import (
     DetectionLimit,
     Diagnosis,
     Extension,
-    Finding,
     Rejected,
     ResidualRms,
     Result,
@@ -23,23 +23,15 @@ from pipelines.diagnosis.result import (
 from pipelines.effects import find_effect
 from pipelines.estimation.nominal import within
 from pipelines.io.log import Array
-from pipelines.report.diagnosis_finding import (
-    all_together,
-    finding_section,
-    gain_table,
-    numbers_section,
-    tip_change,
-    torque_of,
-)
+from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section
 from pipelines.report.diagnosis_picture import picture_sections
-from pipelines.report.finding_words import how_much, of_any_size, taken_in, where
+from pipelines.report.finding_words import headlines
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import boundary_card, data_quality
 from pipelines.report.sentences import as_sentence, paragraphs, sentence
 from pipelines.report.style import format_number, format_unit, three_digits, to_one_place
 from pipelines.report.words import (
     Units,
-    at_places,
     format_value,
     format_values,
     in_order,
@@ -58,9 +50,6 @@ from pipelines.report.words import (
 _CANDIDATES = 40  # lines
 _IN_RUN = "--set diagnose.model=FILE"
 _NEAR = 5  # explanations that are named where none is found
-# Ratio to the noise floor from which the residual of a joint is mentioned: of reference logs, and
-# where the floor is the noise of the residual itself, above which healthy arms lie as well.
-_MENTIONED, _MENTIONED_ABOVE_NOISE = 1.3, 10.0
 _TONES: dict[str, Tone] = {
     "no-fault-found": "good",
     "cause": "bad",
@@ -88,22 +77,28 @@ _say, _paragraphs = partial(sentence, "diagnosis"), partial(paragraphs, "diagnos
 def diagnosis_report(result: Result) -> Report:
     """Verdict, key figures, findings with their proof, evidence, limits."""
     units, nominal, after = units_in(result), result.residual_rms, result.after_rms
-    sections = [*boundary_card(result.boundary)]
+    sections = []
     for number, one in enumerate(result.findings, 1):
         found = finding_section(
             number, one, nominal, units=units, beside=result.findings, left=after.validate
         )
         sections += [found, numbers_section(number, one, units, result.findings)]
     sections += _unknown(result)
-    sections += picture_sections(result, result.rated, units, floor_words(result))
-    sections += [*_baseline(result), *_rejected(result), *_candidates(result)]
-    sections += [*_limits(result), _basis(result), *data_quality(result.data_quality)]
+    more = picture_sections(result, result.rated, units, floor_words(result))
+    more += [*_baseline(result), *_rejected(result), *_candidates(result)]
+    more += [*_limits(result), _basis(result), *data_quality(result.data_quality)]
+    sections += [*boundary_card(result.boundary), *(replace(one, folded=True) for one in more)]
     name = "noise of the residual" if _is_noise(result) else "left by reference logs"
     errors = torque_errors(
         nominal, after, result.rated, nominal.noise_floor, name, floor_words(result), units
     )
     title = f"Diagnosis of {result.robot}" if result.robot else "Diagnosis"
-    basis = (laws_words(result.laws_of, _IN_RUN, result.fewer_terms), threshold_words(result))
+    judged = _say("held_out", result.held_out)
+    basis = (
+        laws_words(result.laws_of, _IN_RUN, result.fewer_terms),
+        judged,
+        threshold_words(result),
+    )
     shown, advice = tuple(sections), _advice(result)
     return Report(title, _verdict(result), _tone(result), errors, shown, advice, basis)
 
@@ -119,58 +114,22 @@ def _tone(result: Result) -> Tone:
 
 
 def _verdict(result: Result) -> str:
-    """One sentence; what judged where no log did; what was not looked for."""
-    first, *more = result.findings or (None,)
-    named_first: dict[str, object] = {"first": "", "size": "", "tip": "", "alone": False}
-    if result.verdict == "cause" and first is not None:
-        whole = all_together(result.findings)
-        alone = whole is first.gain  # of the first alone it says nothing of them all
-        named_first = {
-            "first": f"{first.title}{how_much(first)}{where(first)}",
-            "size": _size(first, result) if math.isfinite(first.torque_rms) else "",
-            "tip": "" if alone and more else tip_change(whole),
-            "alone": alone,
-        }
-    unseen = at_places((one.cause, str(one.joint or "")) for one in result.not_identifiable)
+    """A line for each cause, and one for causes that were not looked for."""
+    lines = [without_keys(line) for line in headlines(result)]
     without = dict.fromkeys(within(title_of(c)) for c in result.without if is_cause(c))
-    return _say(
-        "verdict",
-        result,
-        changed=result.question == "what has changed",
-        reason=without_keys(result.reason),
-        others=_further(more),
-        stays=what_stays(result),
-        unseen=[words for _, words in unseen],
-        without=list(without),
-        **named_first,
-    )
-
-
-def _further(more: Sequence[Finding]) -> list[str]:
-    """Every further cause once: with its joints, or with its size where it is at one place."""
-    found = []
-    for cause, words in together(more):
-        own = [one for one in more if one.cause == cause]
-        one = own[0]
-        single = f"{within(one.title)}{how_much(one)}{where(one)}"
-        found.append(single if len(own) == 1 else words)
-    return found
-
-
-def _size(one: Finding, result: Result) -> str:
-    """Of its torque, and whether the model hid most of it."""
-    rated = one.of_rated if math.isfinite(one.of_rated) else None
-    torque, hidden = torque_of(one, units_in(result)), taken_in(one, result.residual_rms.identify)
-    return _say("size", of_any_size(one), torque, rated, hidden)
+    if without:
+        lines.append(f"Not looked for, because you said so: {', '.join(without)}.")
+    return "\n".join(lines)
 
 
 def _advice(result: Result) -> tuple[str, ...]:
-    """What to look at on the machine, cause by cause."""
+    """What to check on the machine, of causes whose line has no room for it."""
+    said = " ".join(headlines(result))
     several = len(result.findings) > 1
     return tuple(
-        f"What to check{f' for {words}' if several else ''}: "
-        f"{as_sentence(find_effect(cause).words.remedy)}"
+        f"What to check{f' for {words}' if several else ''}: {as_sentence(remedy)}"
         for cause, words in together(result.findings)
+        if (remedy := find_effect(cause).words.remedy).split(";")[0] not in said
     )
 
 
@@ -182,14 +141,6 @@ def _is_noise(found: Diagnosis) -> bool:
 def floor_words(found: Diagnosis) -> str:
     """Return where the noise floor comes from."""
     return _say("floor", found.noise_floor_origin)
-
-
-def what_stays(found: Diagnosis) -> str:
-    """Return the joints whose residual is still above the noise floor; or nothing."""
-    limit = _MENTIONED_ABOVE_NOISE if _is_noise(found) else _MENTIONED
-    ratio = found.after_rms.validate / np.maximum(found.residual_rms.noise_floor, 1e-300)
-    high = [(j + 1, float(ratio[j])) for j in np.flatnonzero(ratio > limit).tolist()]
-    return _say("stays", _is_noise(found), high)
 
 
 def torque_errors(
@@ -413,8 +364,7 @@ def _extension_verdict(result: Extension) -> str:
     refused = [words for _, words in together(result.rejected)]
     found = [words for _, words in together(result.findings)]
     reason = result.rejected[0].reason if result.rejected else "no cause was named"
-    tip = "" if result.gain is None else tip_change(result.gain)
-    return _say("extension", result, found, refused, without_keys(reason), tip)
+    return _say("extension", result, found, refused, without_keys(reason))
 
 
 def _not_accepted(result: Extension) -> list[Section]:

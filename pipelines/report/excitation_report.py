@@ -12,13 +12,7 @@ import numpy as np
 from pipelines.excitation.discrimination import Apart
 from pipelines.excitation.result import DrawnPlan, Result, beyond_words
 from pipelines.report import style
-from pipelines.report.figures import (
-    Array,
-    envelope,
-    joint_signal_figure,
-    one_figure,
-    rows_figure,
-)
+from pipelines.report.figures import Array, envelope, joint_signal_figure, one_figure, rows_figure
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
 from pipelines.report.sections import NO_COLLISION_CHECK
 from pipelines.report.sentences import paragraphs, sentence

@@ -1,8 +1,8 @@
-"""Describe findings in words: their place, their size, and the causes that imitate them.
+"""Describe findings in words: the verdict in one line a cause, their place and size.
 
-summary_of(result)             one sentence for a technician
+headlines(result)              the verdict, a line for each cause
 where(finding)                 " at joint 2 (from joint 1)"
-how_much(finding)              " of 0.15 kg", " (28 Hz)", " (-10 %)"
+how_much(finding)              "0.349 ± 0.001 N m", "28.0 ± 0.1 Hz", "-10.0 ± 0.1 %"
 taken_in(finding, left)        ", most of which the nominal model had taken in"
 of_any_size(finding)           whether these logs leave open how large its torque is
 """
@@ -14,13 +14,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.diagnosis.result import Alternative, Diagnosis, Finding, Value
+from pipelines.diagnosis.result import Alternative, Finding, Result, Value
 from pipelines.effects import find_effect
-from pipelines.estimation.nominal import plain_number, within
+from pipelines.estimation.nominal import within
 from pipelines.io.log import Array
 from pipelines.report.config import REPORT
+from pipelines.report.sentences import as_sentence
+from pipelines.report.style import format_number, with_std
 
-__all__ = ["how_much", "of_any_size", "other_joint", "summary_of", "taken_in", "where"]
+__all__ = ["headlines", "how_much", "of_any_size", "other_joint", "taken_in", "where"]
 
 # usual units, where these are not SI
 _USUAL = {"1": (100.0, "%"), "rad": (1e3, "mrad"), "m": (1e3, "mm"), "s": (1e3, "ms")}
@@ -29,58 +31,100 @@ _TORQUES = ("N m", "N")
 _OTHER = {"from_joint": "from", "with_joint": "with"}  # parameters that name another joint
 
 
-def summary_of(found: Diagnosis) -> str:
-    """Return the summary, one sentence for a technician."""
+def headlines(found: Result) -> tuple[str, ...]:
+    """Return the verdict: a line for each cause, or one line where no cause is named."""
+    changed = found.question == "what has changed"
+    if found.findings:
+        lines = [_line(one, found) for one in found.findings]
+        return (*lines, as_sentence(found.reason)) if found.reason else tuple(lines)
     if found.verdict == "no-fault-found":
-        return "Nothing is wrong with this arm, as far as these logs can tell."
+        what = "No change since the reference logs" if changed else "No fault"
+        return (
+            f"{what} was found, as far as these logs can tell. {as_sentence(found.reason)}".strip(),
+        )
     if found.verdict == "cannot-judge":
-        return f"Whether anything is wrong with this arm cannot be judged: {found.reason}."
-    if not found.findings:
-        return f"Something is wrong, and no cause is named: {found.reason}."
-    first, *more = found.findings
-    what = f"{first.title}{how_much(first)}{where(first)}"
-    if first.alternatives:
-        which = "".join(f", or {_alternative(first, one)}" for one in first.alternatives)
-        return f"{what}{which}: these logs do not tell which. {first.experiment or ''}".rstrip()
-    revolute = () if found.nominal is None else found.nominal.robot.revolute
-    turns = revolute if first.joint is None else revolute[first.joint - 1 : first.joint]
-    units = dict.fromkeys("N m rms of torque" if one else "N rms of force" for one in turns)
-    size = f"{first.torque_rms:.2g} {' or '.join(units)}"
-    return f"{what}: {size}{taken_in(first, found.residual_rms.identify)}{_beside(more)}."
+        what = "has changed since the reference logs" if changed else "is wrong"
+        return (f"These logs cannot show whether anything {what}: {as_sentence(found.reason)}",)
+    return (f"The residual exceeds the noise, and no cause is named: {as_sentence(found.reason)}",)
 
 
-def _alternative(first: Finding, other: Alternative) -> str:
+def _line(one: Finding, found: Result) -> str:
+    """Return a cause: joint, size, probability, gain, share of the excess residual, next action."""
+    size, p = how_much(one), _probability(one.probability)
+    what = f"{one.title}{where(one, found.joints)}{f': {size}' if size else ''}{p}"
+    if one.alternatives:
+        others = [_alternative(one, other, found.joints) for other in one.alternatives]
+        words = f"{what}, or {', or '.join(others)}: these logs do not separate them."
+        return f"{words} {as_sentence(one.experiment or '')}".strip()
+    gain = f"; {_gain(one, found)}, {100.0 * one.explained:.0f} % of the excess residual."
+    action = as_sentence(find_effect(one.cause).words.remedy.split(";")[0])
+    line = f"{what}{gain} {action}"
+    return line if len(line) <= REPORT.headline else f"{what}{gain}"
+
+
+def _gain(one: Finding, found: Result) -> str:
+    """Return the held-out torque error of its joint, or of the largest, without and with it."""
+    torque = one.gain.validate_torque_rms
+    joint = int(np.argmax(torque.before - torque.after)) if one.joint is None else one.joint - 1
+    unit, scale = "N m", 1.0
+    if joint < len(found.rated) and np.isfinite(found.rated[joint]):
+        unit, scale = "% of rated", 100.0 / found.rated[joint]
+    before, after = (
+        format_number(float(x[joint]) * scale, 2) for x in (torque.before, torque.after)
+    )
+    at = f" of joint {joint + 1}" if one.joint is None else ""
+    return f"held-out torque error{at} {before} → {after} {unit}"
+
+
+def _probability(p: float | None) -> str:
+    if p is None or not np.isfinite(p):
+        return ""
+    return " (p > 0.99)" if p > 0.99 else f" (p = {p:.2f})"
+
+
+def _alternative(first: Finding, other: Alternative, names: Sequence[str]) -> str:
     like = replace(first, cause=other.cause, joint=other.joint, log=None)
     like = replace(like, parameters=other.parameters)
-    return f"{within(find_effect(other.cause).words.title)}{how_much(like)}{where(like)}"
+    size, p = how_much(like), _probability(other.probability)
+    title = within(find_effect(other.cause).words.title)
+    return f"{title}{where(like, names)}{f': {size}' if size else ''}{p}"
 
 
-def where(one: Finding) -> str:
-    """Return the joint of a finding, the other joint it depends on, and when it happened."""
+def where(one: Finding, names: Sequence[str] = ()) -> str:
+    """Return the joint of a finding, the other joint it depends on, and when it happened.
+
+    Args:
+        names: of the joints; none: only the number is given.
+    """
     other, start = other_joint(one.parameters), one.parameters.get("start")
     at = "" if one.joint is None else f" at joint {one.joint}"
+    name = names[one.joint - 1] if one.joint is not None and one.joint <= len(names) else ""
+    told = ", ".join(x for x in (name if name != f"joint {one.joint}" else "", other) if x)
     when = ""
     if start is not None and isinstance(start.value, int | float):
         when = f", {start.value:.2f} s into {one.log or 'every log'}"
-    return f"{at}{f' ({other})' if other else ''}{when}"
+    return f"{at}{f' ({told})' if told else ''}{when}"
 
 
 def how_much(one: Finding) -> str:
-    """Return the number that is the size of a finding, to three digits; empty without one."""
+    """Return the size of a finding with its standard deviation, and the order of what repeats.
+
+    Where no single number is its size, the rms of its torque.
+    """
     effect = find_effect(one.cause)
-    told = one.parameters.get(effect.words.size)
-    if told is None or not isinstance(told.value, int | float) or not np.isfinite(told.value):
-        return ""
-    if told.unit == "kg" and one.joint is None:
-        return f" of {plain_number(told.value, 3)} kg"
-    degrees, usual = (1.0 / _DEGREE, "°"), _USUAL.get(told.unit, (1.0, told.unit))
-    times, unit = degrees if effect.words.size == "angle" else usual
-    signed = any(q.name == effect.words.size and q.low < 0.0 for q in effect.parameters)
-    sign = "+" if signed and told.value > 0.0 else ""
-    space = "" if unit == "°" else " "
-    std = told.std if isinstance(told.std, float) and np.isfinite(told.std) else 0.0
-    off = f" ± {plain_number(std * times, 2)}" if abs(told.value) < REPORT.vague * std else ""
-    return f" ({sign}{plain_number(told.value * times, 3)}{off}{space}{unit.replace('^2', '²')})"
+    name = effect.words.size
+    size = one.parameters.get(name)
+    if size is None or not isinstance(size.value, int | float) or not np.isfinite(size.value):
+        return f"{format_number(one.torque_rms, 2)} N m rms" if np.isfinite(one.torque_rms) else ""
+    times, unit = _USUAL.get(size.unit, (1.0, size.unit))
+    if name == "angle":
+        times, unit = 1.0 / _DEGREE, "°"
+    signed = size.unit != "kg" and any(q.name == name and q.low < 0.0 for q in effect.parameters)
+    std = size.std * times if isinstance(size.std, float) else None
+    words = f"{'+' if signed and size.value > 0.0 else ''}{with_std(size.value * times, std)}"
+    order = one.parameters.get("order")
+    waves = "" if order is None else f", order {format_number(float(np.ravel(order.value)[0]), 3)}"
+    return f"{words}{'' if unit == '°' else ' '}{unit.replace('^2', '²')}{waves}"
 
 
 def other_joint(parameters: Mapping[str, Value]) -> str:
@@ -90,15 +134,6 @@ def other_joint(parameters: Mapping[str, Value]) -> str:
         if isinstance(joint, int | float):
             return f"{word} joint {joint:g}"
     return ""
-
-
-def _beside(others: Sequence[Finding]) -> str:
-    """Return "; and torque logging delay (120 ms) at joint 1", and how many more there are."""
-    told = [f"{within(one.title)}{how_much(one)}{where(one)}" for one in others[:REPORT.told]]
-    if len(others) > REPORT.told:
-        told.append(f"{len(others) - REPORT.told} more")
-    *first, last = told or [""]
-    return f"; {', '.join(first)}{' ' if first else ''}and {last}" if last else ""
 
 
 def taken_in(one: Finding, left: Array) -> str:

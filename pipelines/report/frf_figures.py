@@ -9,14 +9,7 @@ import numpy as np
 
 from pipelines.frequency.controller import double_integrator
 from pipelines.frequency.rational import Mode
-from pipelines.frequency.result import (
-    COHERENCE,
-    Band,
-    Curve,
-    Method,
-    Posture,
-    same_bins,
-)
+from pipelines.frequency.result import COHERENCE, Band, Curve, Method, Posture, same_bins
 from pipelines.frequency.spectra import Complex, ExcitedBand
 from pipelines.report import style
 from pipelines.report.figures import Array, Look, joint_colour, one_figure

@@ -16,13 +16,7 @@ from pipelines.friction.fit import Value
 from pipelines.friction.laws import law_named
 from pipelines.friction.result import JointResult, Result, Series
 from pipelines.report import style
-from pipelines.report.figures import (
-    Look,
-    draw_measured,
-    draw_modelled,
-    envelope,
-    rows_figure,
-)
+from pipelines.report.figures import Look, draw_measured, draw_modelled, envelope, rows_figure
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
 from pipelines.report.sections import data_quality
 from pipelines.report.sentences import capital, paragraphs, sentence
@@ -188,9 +182,7 @@ def _joint_sections(joint: JointResult) -> list[Section]:
     how = BreakAwayConfig()
     never = _never_broke_away(joint)
     text = _paragraphs("joint", joint, speed, drift, _sticking(joint), never, how.rest, how.within)
-    sections = [
-        Section(f"{name}: friction", text, _tables(joint), (_curve_figure(joint),)),
-    ]
+    sections = [Section(f"{name}: friction", text, _tables(joint), (_curve_figure(joint),))]
     if joint.validation.by:
         figures = (_simulation_figure(joint), _fraction_figure(joint))
         said = _paragraphs("simulation", joint.validation, speed)

@@ -90,7 +90,7 @@ def render_report(report: Report, footer: Mapping[str, str]) -> dict[str, bytes]
         sections.append(_section_words(section) | {"figures": shown, "n": len(sections) + 1})
     page = template("page.html").render(
         title=printable(report.title),
-        verdict=_prose(report.verdict),
+        verdict=[_prose(line) for line in report.verdict.split("\n")],
         advice=[_prose(line) for line in report.advice],
         tone=report.tone,
         words=_WORDS,
@@ -106,7 +106,7 @@ def in_short(report: Report, checks: Sequence[Check] = ()) -> str:
     """Return the verdict, what was found in the inputs, and the key figures as HTML."""
     table = report.key_figures and _table_words(report.key_figures)
     said = [_prose(f"{check.code}: {check.message}") for check in checks if check.level != "ok"]
-    verdict = _prose(report.verdict)
+    verdict = _prose(report.verdict.replace("\n", " "))
     return template("notebook.html").render(verdict=verdict, said=said, table=table)
 
 
@@ -151,6 +151,7 @@ def _section_words(section: Section) -> dict[str, object]:
         "warning": _prose(section.warning),
         "tables": [_table_words(table) for table in section.tables],
         "leads": section.leads,
+        "folded": section.folded,
     }
 
 

@@ -76,6 +76,7 @@ class Section:
     figures: tuple[Figure, ...] = ()
     warning: str = ""
     leads: bool = False  # drawn before the key figures
+    folded: bool = False  # closed until the reader opens it, and not printed
 
 
 @dataclass(frozen=True)

@@ -94,8 +94,10 @@ def run_report(result: Result) -> Report:
         sections = [*boundary_card(result.boundary), *stages_section(stage_lines(steps))]
         sections += [_stages(steps), *_lacking(steps)]
         for step in sorted(steps, key=lambda step: not isinstance(step.result, Diagnosis)):
-            sections += _titled(_fewer(step.report.sections, step.name), step.name)
-    key, verdict = _key_figures(steps), " ".join(_verdicts(steps))
+            shown = _titled(_fewer(step.report.sections, step.name), step.name)
+            folds = not isinstance(step.result, Diagnosis)
+            sections += [replace(one, folded=one.folded or folds) for one in shown]
+    key, verdict = _key_figures(steps), "\n".join(_verdicts(steps))
     return Report(_title(steps), verdict, tone, key, tuple(sections), advice)
 
 

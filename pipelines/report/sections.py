@@ -98,7 +98,8 @@ def boundary_card(boundary: Boundary | None) -> tuple[Section, ...]:
         parts["gravity's direction"] = ()
     unknown = [name for name, value in parts.items() if value is None]
     text = paragraphs("boundary", "text", boundary, unknown, len(unknown) < len(parts))
-    return (Section(CARD, text, (table,), leads=True),)
+    leads = any(row[3] != "neutral" for row in rows)
+    return (Section(CARD, text, (table,), leads=leads, folded=not leads),)
 
 
 def _sign(boundary: Boundary) -> Row:

@@ -21,13 +21,7 @@ from pipelines.estimation.nominal import within
 from pipelines.estimation.preparation import FewerTerms
 from pipelines.report.finding_words import other_joint
 from pipelines.report.sentences import capital, sentence
-from pipelines.report.style import (
-    enumerated,
-    format_number,
-    format_unit,
-    unit_in_words,
-    with_std,
-)
+from pipelines.report.style import enumerated, format_number, format_unit, unit_in_words, with_std
 
 _COUNTED = ("second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 _KEY = re.compile(r"\b([a-z]+(?:_[a-z]+)*)(?::(\d+)(?::([a-z]+(?:_[a-z]+)*))?)?\b")

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from pipelines.diagnosis.result import Finding, Gain, ResidualRms, Value
-from pipelines.effects import find_effect
+from pipelines.effects import effect_names, find_effect
 from pipelines.estimation.model_fit import TorqueGain
 from pipelines.report.diagnosis_finding import finding_section
-from pipelines.report.diagnosis_report import what_stays
-from pipelines.report.finding_words import how_much
+from pipelines.report.finding_words import headlines, how_much
 
 
 def finding(cause: str = "quadratic_drag", joint: int | None = 3, other: dict[str, float] | None = None) -> Finding:
@@ -29,51 +27,29 @@ def finding(cause: str = "quadratic_drag", joint: int | None = 3, other: dict[st
 NOMINAL = ResidualRms(np.array([0.5, 0.4, 0.02]), np.array([0.5, 0.4, 0.02]), np.full(3, 0.005))
 
 
-@pytest.mark.parametrize(
-    ("origin", "left", "said"),
-    [
-        (
-            "reference logs",
-            (0.1, 0.04),
-            "Ratio of the remaining held-out residual to the noise floor: joint 1 2.",
-        ),
-        ("reference logs", (0.06, 0.04), ""),
-        (
-            "blocks",
-            (0.6, 0.04),
-            "On held-out motion the residual of joint 1 is above the noise; whether it is above "
-            "that of a healthy arm is not known: there are no reference logs.",
-        ),
-        ("blocks", (0.4, 0.04), ""),  # any arm leaves more than noise at its reversals
-    ],
-)
-def test_what_stays_above_the_floor_is_said(
-    origin: str, left: tuple[float, ...], said: str
-) -> None:
-    floor = np.array([0.05, 0.04])
-    rms = ResidualRms(np.array(left), np.array(left), floor)
-    found: Any = SimpleNamespace(noise_floor_origin=origin, after_rms=rms, residual_rms=rms)
-    assert what_stays(found) == said
-
-
 @pytest.mark.parametrize(("cause", "joint", "name", "value", "said"), [
-    ("payload", None, "mass", Value(0.15004, 1e-4, "kg"), " of 0.15 kg"), ("cogging", 2, "amplitude", Value(0.4, 0.01, "N m"), ""),
-    ("base_resonance", None, "frequency", Value(28.02, 0.1, "Hz"), " (28 Hz)"),
-    ("torque_gain", 1, "gain_error", Value(-0.1004, 1e-3, "1"), " (-10 %)"),
-    ("torque_gain", 1, "gain_error", Value(0.02, 1e-3, "1"), " (+2 %)"),
-    ("time_delay", 1, "delay", Value(0.005, 1e-5, "s"), " (5 ms)"),
-    ("link_length", None, "error", Value(0.012, 1e-4, "m"), " (+12 mm)"),
-    ("gravity_tilt", None, "angle", Value(np.deg2rad(5.0), 1e-3, "rad"), " (5°)"),
-    ("encoder_eccentricity", 3, "amplitude", Value(0.004, 1e-4, "rad"), " (4 mrad)"),
-    ("rotor_inertia", 3, "inertia", Value(0.006, 1e-4, "kg m^2"), " (0.006 kg m²)"), ("rotor_inertia", 3, "inertia",
-                                                                                    Value(5.2, 0.1, "kg"), " (5.2 kg)"),
-    ("torque_gain", 1, "gain_error", Value(float("nan"), None, "1"), ""),
-    ("torque_saturation", 2, "limit", Value(1253.0, 0.1, "N m"), " (1250 N m)")])
-def test_how_much_there_is_is_told_in_usual_units(cause: str, joint: int | None, name: str, value: Value, said: str) -> None:
-    """One number says how much there is of a load, and by how much a torque scale is off; of waves none does."""
-    one = finding(cause, joint)
-    assert how_much(replace(one, parameters={name: value})) == said
-    assert how_much(replace(one, parameters={})) == ""
+    ("payload", None, "mass", Value(0.15004, 1e-4, "kg"), "0.15004 ± 0.00010 kg"),
+    ("torque_gain", 1, "gain_error", Value(-0.1004, 1e-3, "1"), "−10.04 ± 0.10 %"),
+    ("time_delay", 1, "delay", Value(0.005, 1e-5, "s"), "5.000 ± 0.010 ms"),
+    ("link_length", None, "error", Value(0.012, 1e-4, "m"), "+12.00 ± 0.10 mm"),
+    ("gravity_tilt", None, "angle", Value(np.deg2rad(5.0), None, "rad"), "5°"),
+    ("torque_gain", 1, "gain_error", Value(float("nan"), None, "1"), "0.03 N m rms")])
+def test_the_size_of_a_finding_has_its_usual_unit(cause: str, joint: int | None, name: str, value: Value, said: str) -> None:
+    """Where no number is the size, the rms of its torque is."""
+    assert how_much(replace(finding(cause, joint), parameters={name: value})) == said
+
+
+@pytest.mark.parametrize("cause", effect_names())
+def test_every_cause_has_a_line_of_its_own(cause: str) -> None:
+    """Joint by number and name, probability, gain and share, in at most 240 characters."""
+    numbers = {q.name: Value(0.5, 0.01, q.unit) for q in find_effect(cause).parameters if q.name != "start"}
+    one = replace(finding(cause, 3), parameters=numbers, probability=0.97, explained=0.98)
+    result = SimpleNamespace(findings=(one, one), question="what is wrong", reason="", joints=("waist", "shoulder", "elbow"),
+                             rated=(1.0, 1.0, np.inf))
+    lines = headlines(result)  # type: ignore[arg-type]
+    assert len(lines) == 2
+    assert len(lines[0]) <= 240
+    assert all(words in lines[0] for words in ("joint 3 (elbow", "(p = 0.97)", "0.02 → 0.005 N m", "98 %"))
 
 
 def test_several_findings_are_one_extension() -> None:

@@ -25,7 +25,7 @@ from pipelines.report.diagnosis_finding import (
     finding_section,
     numbers_section,
 )
-from pipelines.report.diagnosis_report import diagnosis_report, torque_errors
+from pipelines.report.diagnosis_report import torque_errors
 from pipelines.report.words import (
     together,
 )
@@ -88,12 +88,3 @@ def test_a_torque_error_stands_beside_the_noise_floor() -> None:
     assert table.rows[1][1:4] == (0.088, 0.08, 0.075)
     same = torque_errors(before, before, (60.0, 60.0), floor, "left by reference logs", "")
     assert not any("extended" in name for name in same.columns)
-
-
-@pytest.mark.parametrize("verdict", ["cause", "no-fault-found", "unknown"])
-def test_the_verdict_says_that_no_log_of_its_own_judged(verdict: str) -> None:
-    there = NOTHING | {"verdict": verdict, "findings": (found("cogging"),) if verdict == "cause" else ()}
-    for held_out in ("logs", "blocks"):
-        page = diagnosis_report(Result(**(there | {"held_out": held_out})))
-        assert ("Judged by blocks held out of the identification logs" in page.verdict) is (held_out != "logs")
-        assert ("none has role validate" in page.verdict) is (held_out == "blocks")

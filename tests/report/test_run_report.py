@@ -102,4 +102,4 @@ def test_a_log_that_cannot_be_used_is_named_before_the_answer() -> None:
     bare = Diagnosis(**empty)  # type: ignore[arg-type]
     steps = (Step("inspect", 3, object(), Report("Log doctor", "The log cannot be used.", "bad"), (check,)),
              Step("diagnose", 0, bare, Report("Diagnosis", "Nothing is wrong.", "good"), ()))
-    assert run_report(Result(steps)).verdict.startswith("Left out as unusable: a.h5 (its clock runs backwards). Nothing is wrong.")
+    assert run_report(Result(steps)).verdict.startswith("Left out as unusable: a.h5 (its clock runs backwards).\nNothing is wrong.")
