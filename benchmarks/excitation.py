@@ -276,8 +276,6 @@ def six_axes(seeds: int) -> None:
             "--time-limit",
             "55",
             "--no-report",
-            "--set",
-            "design-excitation.rehearse=false",
             "--seed",
             str(seed),
         )

@@ -22,7 +22,6 @@ from pipelines.errors import NothingMatched, UsageError
 from pipelines.excitation.discrimination import Pair, best, refuse_hidden, refuse_one
 from pipelines.excitation.optimise import Effort
 from pipelines.excitation.other_plans import frf_plans, friction_plans, hold_plans
-from pipelines.excitation.rehearsal import rehearsed_plans
 from pipelines.excitation.result import Result, doubts, first_mode, information_of, judged, planned
 from pipelines.excitation.result import log_of as planned_log_of
 from pipelines.excitation.task import Wishes, plan_task
@@ -55,7 +54,7 @@ class Settings:
         None, "Description, URDF, log or shipped name. [robot.toml here, else rrr]", "ROBOT")
     experiment: str = option("excitation", "excitation, friction, frf or hold.")
     criterion: str = option(
-        "default", "default (A with condition 3), condition, frobenius, E, D or A.")
+        "default", "default (A with condition 3), condition, D or A.")
     cond_max: float | None = option(None, "Ceiling on the condition number. [default: 3]")
     harmonics: tuple[int, ...] | None = option(None, "Harmonics: one number, or one a joint.")
     frequency: tuple[float, ...] = option((0.1,), "Fundamental [Hz]: one, or one a joint.")
@@ -71,7 +70,6 @@ class Settings:
         None, "Posture to start from [rad], one a joint: 0,-1.57,0.")
     rest: bool = option(True, "In motion at both ends, with run-in and run-out.", "--no-rest")
     periods: int = option(1, "How often the period is repeated.")
-    random: bool = option(False, "frf: random noise in the place of odd multisines.")
     sample_time: float = 1e-3  # [s]
     friction: bool | None = option(
         None, "Count columns of friction as well. [on every arm but the RRR arm]",
@@ -85,7 +83,6 @@ class Settings:
     recipe: str | None = option(
         None, "Recipe of import: controller.csv in its order, units and rate.")
     mode_factor: float = 3.0  # times that the top harmonic stays below the first mode
-    rehearse: bool = True
     discriminate: tuple[str, ...] = option(
         (), "Two causes that the motion shall separate: spring:2 cogging:2:order=1.", pair=True,
         causes=True)
@@ -182,7 +179,7 @@ def _earlier(request: Request, settings: Settings, robot: RobotDescription) -> I
 
 
 def compute(inputs: Inputs, settings: Settings) -> Result:
-    """Decide what was left open, search, judge, rehearse.
+    """Decide what was left open, search, judge.
 
     Raises:
         UsageError: C02, settings that do not fit; C08, limits that no motion keeps: says which.
@@ -203,17 +200,17 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     if pair is not None:
         refuse_hidden(task, pair, settings.seed)
     effort = Effort(settings.time_limit, settings.evaluations, given.tell)
-    found = best(task, pair, effort, settings.seed, settings.rehearse)
+    design, apart = best(task, pair, effort, settings.seed)
     given.tell("judging the design")
-    trajectory = found.design.trajectory
+    trajectory = design.trajectory
     t, motion = trajectory.sampled(settings.sample_time)
     log = planned_log_of(task, f"{settings.criterion} excitation", t, motion, "excitation")
     log = replace(log, period=trajectory.series.period if task.rest else None)
     table = controller_table(given.recipe, task.robot, lambda at: trajectory.at(at)[0].T,
                              trajectory.duration, settings.sample_time)
     return replace(
-        judged(task, found, settings.seed), criterion=settings.criterion, robot_from=given.why,
-        torque_share=settings.torque_share, speed_share=settings.speed_share,
+        judged(task, design, apart, settings.seed), criterion=settings.criterion,
+        robot_from=given.why, torque_share=settings.torque_share, speed_share=settings.speed_share,
         after=tuple(log.name for log in logs), first_mode=mode, mode_factor=settings.mode_factor,
         logs=(("trajectory", log),), table=table)
 
@@ -224,14 +221,10 @@ def _plans(given: Material, settings: Settings, wishes: Wishes) -> Result:
     if settings.experiment == "friction":
         plans = friction_plans(task)
     elif settings.experiment == "frf":
-        plans = frf_plans(task, seed, settings.random)
+        plans = frf_plans(task, seed)
     else:
         plans = hold_plans(task, seed)
-    result = planned(task, settings.experiment, seed, plans)
-    if settings.rehearse:
-        rehearsals, failed = rehearsed_plans(task, plans, seed, given.tell)
-        result = replace(result, rehearsals=rehearsals, rehearsal_failed=failed)
-    return replace(result, robot_from=given.why)
+    return replace(planned(task, settings.experiment, seed, plans), robot_from=given.why)
 
 
 def _refuse_strange(settings: Settings) -> None:

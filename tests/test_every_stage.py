@@ -100,7 +100,7 @@ def _run(module: str, tmp_path: Path, samples: Path) -> Ran:
     if module == "compare":
         paths = (written_result(tmp_path / "a", 1), written_result(tmp_path / "b", 2))
     if module == "design_excitation":
-        settings, paths = replace(settings, evaluations=150, harmonics=(15,), rehearse=False), ()
+        settings, paths = replace(settings, evaluations=150, harmonics=(15,)), ()
     return stage, run_stage(stage, Request(paths, out=tmp_path / "out", no_report=True), settings)
 
 

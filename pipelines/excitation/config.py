@@ -18,7 +18,7 @@ class Round:
 
 @dataclass(frozen=True)
 class ExcitationConfig:
-    """Of the excitation, of the other experiments and of their rehearsal."""
+    """Of the excitation, and of the other experiments."""
 
     # the equations
     sharpness: float = 20.0  # [s/rad] of Coulomb friction: a change of sign takes several samples
@@ -81,11 +81,7 @@ class ExcitationConfig:
     dwell: float = 2.0  # [s]
     slower: float = 0.8  # a plan that breaks a limit is made slower in such steps
     slowest: float = 0.05
-    # rehearsal
-    loop_hz: float = 8.0  # of the critically damped loop of each joint
-    lightest: float = 1e-4  # of the heaviest joint's inertia: a bound on the gains
     # figures
-    random: int = 20  # motions that a design is compared with
     points: int = 1000  # of a curve
     costly: float = 0.01  # share of the cost above which a limit is named
 

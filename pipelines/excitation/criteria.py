@@ -2,14 +2,12 @@
 
 Group j of equations of equal noise σ_j contributes S_j = A_jᵀ A_j / n (parameters, parameters):
 
-    Φᵀ Φ/n = Σ_j S_j          of which condition, Frobenius and E are taken
+    Φᵀ Φ/n = Σ_j S_j          of which the condition is taken
     M = Σ_j S_j/σ_j²          of which D and A are taken
 
 Of a matrix with eigenvalues λ are minimised
 
     condition    ½ log(λ_max/λ_min) = log cond Φ; smooth: ½ (log tr Mᵖ + log tr M⁻ᵖ)/p, from above
-    frobenius    ½ log(tr M tr M⁻¹), of the Frobenius condition number ‖Φ‖ ‖Φ⁺‖
-    E            -½ log λ_min, the worst direction; smooth: ½ log tr M⁻ᵖ / p
     D            -½ log det M / parameters, the volume of the confidence ellipsoid
     A            ½ log Σ_k g_k (M⁻¹)_kk, the standard deviation, parameters weighed by g
 
@@ -29,9 +27,9 @@ from pipelines.dynamics.body import Array
 from pipelines.excitation.config import CONFIG
 
 __all__ = ["CRITERIA", "FAR", "Figures", "Goal", "Spectrum", "a_optimal", "condition", "d_optimal",
-           "e_optimal", "frobenius", "spectrum"]
+           "spectrum"]
 
-CRITERIA = ("condition", "frobenius", "E", "D", "A")
+CRITERIA = ("condition", "D", "A")
 FAR = 1e6  # numerics: added to the logarithm of a condition number above its ceiling
 ROUNDING = 1e-6  # numerics: relative, of a condition number on another number of samples
 LARGEST = 500.0  # numerics: of an exponent
@@ -72,19 +70,6 @@ def condition(found: Spectrum, p: float) -> tuple[float, Array]:
     return 0.5 * (rising + falling), found.of(0.5 * (high - low) / found.values)
 
 
-def e_optimal(found: Spectrum, p: float) -> tuple[float, Array]:
-    """Return ½ log tr M⁻ᵖ / p, at least -½ log λ_min, and its derivative by M."""
-    value, share = _log_power_sum(1.0 / found.values, p)
-    return 0.5 * value, found.of(-0.5 * share / found.values)
-
-
-def frobenius(found: Spectrum) -> tuple[float, Array]:
-    """Return ½ log(tr M tr M⁻¹) and its derivative by M."""
-    total, inverse = float(found.values.sum()), float((1.0 / found.values).sum())
-    slope = found.of(0.5 / total - 0.5 / inverse / found.values**2)
-    return 0.5 * float(np.log(total * inverse)), slope
-
-
 def d_optimal(found: Spectrum) -> tuple[float, Array]:
     """Return -½ log det M / parameters and its derivative by M."""
     count = len(found.values)
@@ -111,7 +96,6 @@ class Figures:
     """All criteria of one design."""
 
     condition_number: float  # of Φ
-    frobenius: float  # ‖Φ‖ ‖Φ⁺‖
     smallest_singular_value: float  # of Φ/√n
     log_determinant: float  # log det M
     predicted_relative_std: float  # √(mean (std_k/size_k)²) of one experiment
@@ -139,14 +123,8 @@ class Goal:
                                  else a_optimal(weighed, self._weights))
             score = value
             bar[:, self.kept[:, None], self.kept] = on_weighed / self.noise[:, None, None] ** 2
-        elif self.criterion == "condition":
-            (value, on_plain), score = condition(plain, sharpness), plain.condition
-        elif self.criterion == "E":
-            value, on_plain = e_optimal(plain, sharpness)
-            score = -0.5 * math.log(plain.values[0])
         else:
-            value, on_plain = frobenius(plain)
-            score = value
+            (value, on_plain), score = condition(plain, sharpness), plain.condition
         if self.ceiling is not None:
             # steep · log(1 + exp(s (f - log ceiling)))/s, f the smooth log of the condition number
             above, on_above = condition(plain, sharpness)
@@ -187,7 +165,7 @@ class Goal:
         """Return all criteria, whichever is minimised."""
         plain, weighed = self._plain(grams), self._weighed(grams)
         variance = float(self._weights @ np.diag(weighed.covariance)) / self.samples
-        return Figures(plain.condition, math.exp(frobenius(plain)[0]), math.sqrt(plain.values[0]),
+        return Figures(plain.condition, math.sqrt(plain.values[0]),
                        float(np.log(weighed.values).sum()), math.sqrt(variance))
 
     def singular_values(self, grams: Array) -> Array:

@@ -2,8 +2,8 @@
 
     pair = Pair(a, b)
     refuse_hidden(task, pair, seed)
-    found = best(task, pair, Effort(seconds=30), seed, rehearse=True)
-    found.apart.before.similarity, found.apart.after.similarity
+    design, apart = best(task, pair, Effort(seconds=30), seed)
+    apart.before.similarity, apart.after.similarity
 
 With c⊥ = c - Q Qᵀ c the part of a cause's columns that rigid body and friction cannot imitate,
 weighted by the noise, cause A is as similar to B as the length of A⊥ within the span of B⊥ over its
@@ -29,11 +29,9 @@ from pipelines.errors import Interrupted, UsageError
 from pipelines.excitation.config import CONFIG
 from pipelines.excitation.optimise import Design, Effort, design, finished, landscape
 from pipelines.excitation.regressor import grams_of_rows
-from pipelines.excitation.rehearsal import Rehearsal, rehearsed_design
 from pipelines.excitation.task import Task
 
-__all__ = ["Alike", "Apart", "Found", "Pair", "alike", "best", "refuse_hidden", "refuse_one",
-           "told_apart"]
+__all__ = ["Alike", "Apart", "Pair", "alike", "best", "refuse_hidden", "refuse_one", "told_apart"]
 
 ROOM = 0.999  # numerics: of the ceiling; the rest is for the way back to the limits
 FIRST, LEAST = 0.3, 1e-3  # numerics: size of a step
@@ -88,16 +86,6 @@ class Apart:
             fine or after.condition_number <= before.condition_number)
 
 
-@dataclass(frozen=True, eq=False)
-class Found:
-    """A motion as the robot is to execute it."""
-
-    design: Design
-    rehearsal: Rehearsal | None = None
-    failed: str = ""  # why there is no rehearsal
-    apart: Apart | None = None  # of a design that separates two causes
-
-
 def refuse_one(pair: Pair, written: Sequence[str]) -> None:
     """Refuse two causes that are one, as they were `written`.
 
@@ -137,21 +125,19 @@ def refuse_hidden(task: Task, pair: Pair, seed: int) -> None:
                          "logs cannot tell'")
 
 
-def best(task: Task, pair: Pair | None, effort: Effort, seed: int, rehearse: bool) -> Found:
-    """Search the best motion, change it until it separates a pair of causes, and rehearse it.
+def best(task: Task, pair: Pair | None, effort: Effort, seed: int) -> tuple[Design, Apart | None]:
+    """Search the best motion, and change it until it separates a pair of causes.
 
     Half the time is given to either search.
 
     Raises:
         UsageError: C08, no motion keeps the limits: says which one is in the way.
     """
-    half, apart = replace(effort, seconds=0.5 * effort.seconds), None
-    found = design(task, effort if pair is None else half, seed)
-    if pair is not None and not found.stopped:
-        found, apart = told_apart(task, found, pair, half, seed)
-    if not rehearse:
-        return Found(found, apart=apart)
-    return Found(*rehearsed_design(task, found, seed, effort.tell), apart)
+    if pair is None:
+        return design(task, effort, seed), None
+    half = replace(effort, seconds=0.5 * effort.seconds)
+    found = design(task, half, seed)
+    return (found, None) if found.stopped else told_apart(task, found, pair, half, seed)
 
 
 def told_apart(task: Task, designed: Design, pair: Pair, effort: Effort,

@@ -63,18 +63,17 @@ def friction_plans(task: Task) -> tuple[Plan, ...]:
     return tuple(found)
 
 
-def frf_plans(task: Task, seed: int, random: bool = False) -> tuple[Plan, ...]:
+def frf_plans(task: Task, seed: int) -> tuple[Plan, ...]:
     """Plan two experiments a joint: there and back at low speed, with multisines of equal lines.
 
-    The slow turn keeps friction from sticking. `random`: noise instead, as in Kostić et al. 2004,
-    Section IV.D.
+    The slow turn keeps friction from sticking.
 
     Raises:
         UsageError: C08, a limit that even a slow and weak one breaks: says which.
     """
     home, found = _home(task), list[Plan]()
     for j in range(task.robot.n_joints):
-        found += _within(task, partial(_frf, task, j, home, seed, random))
+        found += _within(task, partial(_frf, task, j, home, seed))
     return tuple(found)
 
 
@@ -194,8 +193,7 @@ def _sampled(task: Task, j: int, home: Array, knots: Knots) -> tuple[Array, Arra
     return t, motion
 
 
-def _frf(task: Task, j: int, home: Array, seed: int, random: bool,
-         share: float) -> tuple[Plan, ...]:
+def _frf(task: Task, j: int, home: Array, seed: int, share: float) -> tuple[Plan, ...]:
     """Plan joint j's experiments, `share` as fast and strong as they might be."""
     centre, room = _room(task, j, home, 2.0 * np.pi)
     least = CONFIG.frf_periods * CONFIG.frf_period + CONFIG.frf_settle
@@ -211,31 +209,21 @@ def _frf(task: Task, j: int, home: Array, seed: int, random: bool,
         strength = CONFIG.frf_torque * joint.torque / _inertia(task, j, home)
     else:
         strength = CONFIG.frf_torque * _acceleration(task, j, home) / CONFIG.acceleration
-    found = []
-    for k in range(CONFIG.realisations):
-        own, period, words = _excitation(task, np.random.default_rng([seed, j]),
-                                         np.random.default_rng([seed, j, k]), len(t), random)
-        v = np.zeros((len(t), task.robot.n_joints))
-        v[:, j] = share * strength * own
-        found.append(Plan(
-            f"frf-{j + 1}-{k + 1}", "frf", j + 1, home, t, motion, v, period,
-            f"{speed:.3g} rad/s there and back, {hold:.3g} s each way, {words}; {k + 1} of "
-            f"{CONFIG.realisations}"))
-    return tuple(found)
-
-
-def _excitation(task: Task, grid: np.random.Generator, rng: np.random.Generator, samples: int,
-                random: bool) -> tuple[Array, float | None, str]:
-    """Return a signal of rms 1 (samples,), its period [s], and what it is."""
-    if random:
-        return rng.standard_normal(samples), None, "a random number each sample"
     seconds, (low, high) = CONFIG.frf_period, CONFIG.frf_band
-    period = round(seconds / task.sample_time)
-    lines = odd_lines(grid, int(low * seconds), int(high * period))
+    period, found = round(seconds / task.sample_time), []
+    lines = odd_lines(np.random.default_rng([seed, j]), int(low * seconds), int(high * period))
     words = (f"{len(lines)} odd lines from {lines[0] / seconds:.3g} to "
              f"{lines[-1] / seconds:.4g} Hz, one of four left out to detect distortion, repeated "
              f"every {seconds:g} s")
-    return realisation(rng, lines, period, samples), period * task.sample_time, words
+    for k in range(CONFIG.realisations):
+        own = realisation(np.random.default_rng([seed, j, k]), lines, period, len(t))
+        v = np.zeros((len(t), task.robot.n_joints))
+        v[:, j] = share * strength * own
+        found.append(Plan(
+            f"frf-{j + 1}-{k + 1}", "frf", j + 1, home, t, motion, v, period * task.sample_time,
+            f"{speed:.3g} rad/s there and back, {hold:.3g} s each way, {words}; {k + 1} of "
+            f"{CONFIG.realisations}"))
+    return tuple(found)
 
 
 def odd_lines(rng: np.random.Generator, lowest: int, highest: int) -> npt.NDArray[np.int64]:

@@ -14,12 +14,11 @@ from pipelines.dynamics.body import Array, Motion
 from pipelines.errors import Check, UsageError
 from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.excitation.config import CONFIG
-from pipelines.excitation.discrimination import Apart, Found
+from pipelines.excitation.discrimination import Apart
 from pipelines.excitation.fourier import Trajectory
-from pipelines.excitation.optimise import landscape
+from pipelines.excitation.optimise import Design
 from pipelines.excitation.other_plans import Plan
 from pipelines.excitation.regressor import ArmColumns, grams_of
-from pipelines.excitation.rehearsal import Beyond, Rehearsal
 from pipelines.excitation.task import LOWER_BOUND, Task
 from pipelines.excitation.verify import Peak
 from pipelines.importers.units import ControllerTable
@@ -27,9 +26,8 @@ from pipelines.io.log import ExperimentLog, Signal
 from pipelines.io.results import NOT_STORED
 from pipelines.writing.task import planned_log
 
-__all__ = ["Compared", "Course", "DrawnPlan", "ParameterStd", "Result", "beyond_words",
-           "coefficients", "doubts", "first_mode", "information_of", "judged", "log_of",
-           "planned"]
+__all__ = ["Course", "DrawnPlan", "ParameterStd", "Result", "coefficients", "doubts",
+           "first_mode", "information_of", "judged", "log_of", "planned"]
 
 BLOCK = 4096  # numerics: samples whose rows are computed at once
 
@@ -43,16 +41,6 @@ class ParameterStd:
     value: float | None  # of the model
     std: float  # predicted, of one experiment
     rigid: bool
-
-
-@dataclass(frozen=True)
-class Compared:
-    """Random motions within the same limits."""
-
-    count: int
-    condition_median: float
-    condition_best: float
-    relative_std_median: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +87,6 @@ class Result:
     condition_number: float | None = None
     lower_bound: float | None = None  # no motion of this arm can have a smaller one
     predicted_relative_std: float | None = None
-    frobenius: float | None = None
     smallest_singular_value: float | None = None
     log_determinant: float | None = None
     limits: tuple[Peak, ...] = ()
@@ -112,7 +99,6 @@ class Result:
     shrunk_for: tuple[str, ...] = ()  # the limits, in words, that asked for it
     singular_values: tuple[float, ...] = ()  # of Φ/√n
     parameters: tuple[ParameterStd, ...] = ()
-    random: Compared | None = None
     course: Course | None = None
     period: float = 0.0  # [s]
     periods: int = 0
@@ -127,9 +113,6 @@ class Result:
     first_mode: float | None = None  # [Hz]
     mode_factor: float = 1.0  # times that the top harmonic lies below it, at least
     top_hz: float = 0.0  # [Hz] of the highest harmonic
-    rehearsal: Rehearsal | None = None
-    rehearsal_failed: str = ""
-    rehearsals: tuple[tuple[str, Rehearsal], ...] = ()  # of plans, by name
     robot_from: str = ""  # why this robot, where none was named
     apart: Apart | None = None  # of a design that tells two causes apart
     logs: tuple[tuple[str, ExperimentLog], ...] = field(default=(), metadata=NOT_STORED)
@@ -173,9 +156,9 @@ def planned(task: Task, purpose: str, seed: int, plans: Sequence[Plan]) -> Resul
                    duration=sum(plan.seconds for plan in drawn))
 
 
-def judged(task: Task, found: Found, seed: int) -> Result:
-    """Judge a design on all samples of its period, and random motions in comparison."""
-    design, problem, goal = found.design, task.problem, task.problem.goal
+def judged(task: Task, design: Design, apart: Apart | None, seed: int) -> Result:
+    """Judge a design on all samples of its period."""
+    problem, goal = task.problem, task.problem.goal
     trajectory, columns = design.trajectory, problem.columns
     series = trajectory.series
     samples = max(round(series.period / task.sample_time), 2 * series.harmonics + 2)
@@ -199,65 +182,22 @@ def judged(task: Task, found: Found, seed: int) -> Result:
         evaluations=design.evaluations, found_at=design.found_at, interrupted=design.stopped > 0,
         stopped=design.stopped, reached=goal.meets(figures.condition_number),
         shrunk=design.shrunk, shrunk_for=design.shrunk_for, parameters=parameters,
-        singular_values=tuple(goal.singular_values(grams).tolist()), random=_random(task, seed),
+        singular_values=tuple(goal.singular_values(grams).tolist()),
         course=Course(t, q, dq, ddq, tau, series.omega / (2.0 * np.pi), amplitude),
         period=series.period, periods=trajectory.periods, run_in=trajectory.run_in,
         duration=trajectory.duration, noise=tuple(map(float, goal.noise)),
         friction_columns=columns.friction, top_hz=float(used[-1] + 1) / series.period,
-        rehearsal=found.rehearsal, rehearsal_failed=found.failed, apart=found.apart,
-        coefficients=coefficients(task, trajectory))
-
-
-def _random(task: Task, seed: int) -> Compared:
-    problem, rng = landscape(task), np.random.default_rng([seed, 1])
-    figures = []
-    for _ in range(CONFIG.random):
-        motion = problem.space.motion(problem.start(rng, 0.999), problem.samples)
-        figures.append(task.problem.goal.figures(grams_of(task.problem.columns, motion)))
-    condition = [one.condition_number for one in figures]
-    std = [one.predicted_relative_std for one in figures]
-    return Compared(CONFIG.random, float(np.median(condition)), min(condition),
-                    float(np.median(std)))
+        apart=apart, coefficients=coefficients(task, trajectory))
 
 
 def doubts(result: Result) -> tuple[Check, ...]:
-    """Return C08, a ceiling not reached; D17, no rehearsal; D12, a limit that it did not keep."""
-    found = []
-    if not result.reached:
-        dear = f"; the {result.dearest} is most in the way" if result.dearest else ""
-        found.append(Check.of(
-            "C08", "warn", f"a condition number of {result.ceiling:g} was not reached{dear}",
-            where=result.robot, gate=True,
-            remedy="search longer, give more harmonics, or widen that limit"))
-    if result.rehearsal_failed:
-        found.append(Check.of("D17", "warn", f"the rehearsal failed: {result.rehearsal_failed}",
-                              where=result.robot, remedy="check the model before the robot moves"))
-    motion = () if result.rehearsal is None else (("the motion", result.rehearsal),)
-    for name, rehearsal in (*motion, *result.rehearsals):
-        if rehearsal.safe:
-            continue
-        ways = {"torque": "a smaller torque_share", "speed": "a smaller speed_share",
-                "position": "another --home, or a position range in the robot description that "
-                "leaves room"}
-        named = ", and ".join(dict.fromkeys(ways[one.quantity] for one in rehearsal.beyond))
-        words = ", ".join(beyond_words(result.joints, rehearsal))
-        found.append(Check.of(
-            "D12", "warn", f"rehearsed in simulation, {name} goes beyond limits: {words}",
-            where=result.robot, gate=True, remedy=f"plan it again with {named}; or make sure that "
-            "your controller follows more closely"))
-    return tuple(found)
-
-
-def beyond_words(joints: Sequence[str], found: Rehearsal) -> list[str]:
-    """Return each limit that a rehearsal broke, in words."""
-    def words(joint: str, one: Beyond) -> str:
-        if one.quantity == "torque":
-            return f"the drive of {joint} saturates in {100.0 * one.by:.2g} % of the samples"
-        if one.quantity == "speed":
-            return f"{joint} reaches {100.0 * (1.0 + one.by):.4g} % of its speed limit"
-        return f"{joint} goes {one.by:.2g} {one.unit} beyond its range"
-
-    return [words(joints[one.joint], one) for one in found.beyond]
+    """Return C08 where a ceiling was not reached."""
+    if result.reached:
+        return ()
+    dear = f"; the {result.dearest} is most in the way" if result.dearest else ""
+    words = f"a condition number of {result.ceiling:g} was not reached{dear}"
+    remedy = "search longer, give more harmonics, or widen that limit"
+    return (Check.of("C08", "warn", words, where=result.robot, gate=True, remedy=remedy),)
 
 
 def log_of(task: Task, name: str, t: Array, motion: Array, experiment: str) -> ExperimentLog:

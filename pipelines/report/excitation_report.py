@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipelines.excitation.discrimination import Apart
-from pipelines.excitation.result import DrawnPlan, Result, beyond_words
+from pipelines.excitation.result import DrawnPlan, Result
 from pipelines.report import style
 from pipelines.report.figures import Array, envelope, joint_signal_figure, one_figure, rows_figure
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
@@ -45,27 +45,18 @@ def excitation_report(result: Result) -> Report:
         _shows(result),
         _apart_section(result.apart),
         _certificate(result),
-        _comparison(result),
     )
     smaller = _smaller(result) if result.shrunk < 1.0 - _MUCH else ""
     alike = "" if result.apart is None else _alike(result.apart)
-    verdict = _say("verdict", result, alike, smaller, _trouble(result))
+    verdict = _say("verdict", result, alike, smaller)
     shown = tuple(section for section in sections if section is not None)
     basis, key = (_say("robot", result),), _key_figures(result)
     return Report("Excitation", verdict, _tone(result), key, shown, basis=basis)
 
 
 def _tone(result: Result) -> Tone:
-    found = result.rehearsal
-    open_ = not result.reached or result.interrupted or bool(result.rehearsal_failed)
-    unsafe = (found is not None and not found.safe) or not result.torque_checked
-    return "attention" if open_ or unsafe or _are_rivals(result.apart) else "good"
-
-
-def _trouble(result: Result) -> list[str]:
-    if result.rehearsal is None:
-        return []
-    return list(beyond_words(result.joints, result.rehearsal))
+    open_ = not result.reached or result.interrupted or not result.torque_checked
+    return "attention" if open_ or _are_rivals(result.apart) else "good"
 
 
 def _smaller(result: Result) -> str:
@@ -126,7 +117,6 @@ def _key_figures(result: Result) -> Table:
         predicted = 100 * (result.predicted_relative_std or math.nan)
         rows.append(("relative standard deviation, predicted [%]", predicted))
     rows += [
-        ("Frobenius condition number", result.frobenius),
         ("smallest singular value of Φ/√n", result.smallest_singular_value),
         ("log det of the information matrix", result.log_determinant),
         ("duration", f"{duration} and twice {run_in}" if run_in else duration),
@@ -143,38 +133,8 @@ def _key_figures(result: Result) -> Table:
 
 
 def _safety(result: Result) -> Section:
-    text = _paragraphs("safety", result, _trouble(result))
-    tables = (_rehearsal_table(result),) if result.rehearsal is not None else ()
-    return Section("Before the robot moves", text, tables, warning=NO_COLLISION_CHECK)
-
-
-def _rehearsal_table(result: Result) -> Table:
-    found = result.rehearsal
-    assert found is not None
-    position, torque, speed = (unit_of(result.limits, q) for q in ("position", "torque", "speed"))
-    rows = []
-    for j, name in enumerate(result.joints):
-        beyond = math.nan if found.position_beyond is None else found.position_beyond[j]
-        peak, limit = found.torque_peak[j], found.torque_limit[j]
-        fastest, allowed = found.speed_peak[j], found.speed_limit[j]
-        away = (found.position_rms[j], found.position_max[j])
-        used = (peak, limit, 100 * peak / limit, fastest, allowed, 100 * fastest / allowed)
-        left = None if math.isnan(beyond) else -beyond
-        rows.append((name, *away, *used, left, 100 * found.saturated[j]))
-    columns = (
-        "joint",
-        f"away, rms [{position}]",
-        f"away, most [{position}]",
-        f"torque, peak [{torque}]",
-        f"limit [{torque}]",
-        "used [%]",
-        f"speed, peak [{speed}]",
-        f"limit [{speed}]",
-        "used [%]",
-        f"left of its range [{position}]",
-        "saturated [%]",
-    )
-    return Table(columns, tuple(rows))
+    text = _paragraphs("safety", result)
+    return Section("Before the robot moves", text, warning=NO_COLLISION_CHECK)
 
 
 def _ends(result: Result, quantity: str) -> tuple[list[float], list[float]]:
@@ -265,22 +225,8 @@ def _certificate(result: Result) -> Section | None:
     return Section("Certificate", _paragraphs("certificate", bound, number, _NEAR_BOUND))
 
 
-def _comparison(result: Result) -> Section | None:
-    r = result.random
-    if r is None or result.predicted_relative_std is None:
-        return None
-    rows = (
-        ("this design", result.condition_number, 100 * result.predicted_relative_std),
-        (f"random, median of {r.count}", r.condition_median, 100 * r.relative_std_median),
-        (f"random, best condition of {r.count}", r.condition_best, None),
-    )
-    text = _paragraphs("random", r.relative_std_median / result.predicted_relative_std)
-    table = Table(("motion", "condition number", "relative std, predicted [%]"), rows)
-    return Section("Beside random motions", text, (table,))
-
-
 def _plans_report(result: Result) -> Report:
-    """The plans of other experiments, their limits and their rehearsals."""
+    """The plans of other experiments and their limits."""
     plans = Table(
         (
             "experiment",
@@ -304,7 +250,7 @@ def _plans_report(result: Result) -> Report:
         ),
     )
     sections = [
-        _plans_safety(result),
+        _safety(result),
         Section("Experiments", tables=(plans,)),
         Section("Limits", _paragraphs("plan_limits", result.torque_checked), (limits,)),
     ]
@@ -312,37 +258,8 @@ def _plans_report(result: Result) -> Report:
     if moving:
         figures = tuple(_plan_figure(p, result) for p in moving)
         sections.append(Section("Motions", figures=figures))
-    troubled = [name for name, found in result.rehearsals if not found.safe]
-    tone: Tone = "attention" if result.rehearsal_failed or troubled else "neutral"
-    verdict, basis = _say("plans", result, troubled), (_say("robot", result),)
-    return Report("Planned experiments", verdict, tone, None, tuple(sections), basis=basis)
-
-
-def _plans_safety(result: Result) -> Section:
-    """Of each plan the joint that is nearest to trouble in its rehearsal."""
-    text = _paragraphs("plans_safety", result)
-    if not result.rehearsals:
-        return Section("Before the robot moves", text, warning=NO_COLLISION_CHECK)
-    rows = []
-    for name, found in result.rehearsals:
-        full = max(x / y for x, y in zip(found.torque_peak, found.torque_limit, strict=True))
-        fast = max(x / y for x, y in zip(found.speed_peak, found.speed_limit, strict=True))
-        away = (max(found.position_rms), max(found.position_max))
-        rows.append(
-            (name, found.seconds, *away, 100 * full, 100 * fast, 100 * max(found.saturated))
-        )
-    position = unit_of(result.limits, "position")
-    columns = (
-        "experiment",
-        "rehearsed [s]",
-        f"away, rms [{position}]",
-        f"away, most [{position}]",
-        "torque, of its limit [%]",
-        "speed, of its limit [%]",
-        "saturated [%]",
-    )
-    table = Table(columns, tuple(rows))
-    return Section("Before the robot moves", text, (table,), warning=NO_COLLISION_CHECK)
+    verdict, basis = _say("plans", result), (_say("robot", result),)
+    return Report("Planned experiments", verdict, "neutral", None, tuple(sections), basis=basis)
 
 
 def _plan_figure(plan: DrawnPlan, result: Result) -> Figure:

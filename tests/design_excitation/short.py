@@ -9,7 +9,7 @@ from typing import Any
 from pipelines.design_excitation import STAGE, Settings
 from pipelines.stage import Outcome, Request, run_stage
 
-QUICK = replace(Settings(), robot="rrr", evaluations=150, harmonics=(15,), rehearse=False)
+QUICK = replace(Settings(), robot="rrr", evaluations=150, harmonics=(15,))
 
 
 def designed(out: Path, settings: Settings = QUICK, paths: tuple[Path, ...] = (), **request: Any) -> Outcome[Any]:

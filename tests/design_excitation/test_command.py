@@ -98,15 +98,6 @@ def test_the_table_comes_back_through_its_recipe(tmp_path: Path) -> None:
     np.testing.assert_allclose(imported.q, planned["q_ref"][::2], atol=1e-9)
 
 
-def test_a_rehearsal_before_the_robot_moves(tmp_path: Path) -> None:
-    """The simulated arm follows a modest plan to a few hundredths of a radian, without saturation."""
-    done = designed(tmp_path / "out", replace(QUICK, rehearse=True)).result
-    assert done.rehearsal is not None
-    assert done.rehearsal.safe
-    assert max(done.rehearsal.position_max) < 0.1
-    assert all(peak < limit for peak, limit in zip(done.rehearsal.torque_peak, done.rehearsal.torque_limit, strict=True))
-
-
 @pytest.mark.parametrize(("changes", "code"), [
     ({"experiment": "writing"}, "RRID-C02"), ({"stop_band": (1.0,)}, "RRID-C02"), ({"stop_band": (6.0, 4.0)}, "RRID-C02"),
     ({"stop_band": (-5.0, -2.0)}, "RRID-C02"),
@@ -125,7 +116,7 @@ def test_wrong_usage_is_said(changes: dict[str, Any], code: str, tmp_path: Path)
 def test_the_command_line(tmp_path: Path) -> None:
     """ROBOT defaults to the shipped rrr; options reach the stage; an unknown criterion ends in exit 2."""
     done = rrrid("design-excitation", "--evaluations", "120", "--harmonics", "12", "--out", tmp_path / "out", "--json", "-q",
-                 "--no-report", "--symmetric", "--set", "design-excitation.rehearse=false", "--seed", "7", cwd=tmp_path)
+                 "--no-report", "--symmetric", "--seed", "7", cwd=tmp_path)
     assert done.returncode == 0
     told = json.loads(done.stdout)
     assert (told["robot"], told["evaluations"], told["seed"], len(told["parameters"])) == ("rrr-tue", 120, 7, 13)

@@ -18,7 +18,7 @@ Result = design_excitation.Result
 
 def designed(out: Path, *causes: str, **more: object) -> Outcome[Result]:
     settings = design_excitation.Settings(robot="rrr", harmonics=(8,), discriminate=causes,
-                                          **{"evaluations": 300, "rehearse": False, **more})  # type: ignore[arg-type]
+                                          **{"evaluations": 300, **more})  # type: ignore[arg-type]
     return run_stage(design_excitation.STAGE, Request((), out=out, no_report=True), settings)
 
 
@@ -85,7 +85,7 @@ def test_a_plan_that_tells_apart_and_a_plain_one_lie_beside_each_other(tmp_path:
     monkeypatch.chdir(tmp_path)
     folders = []
     for causes in ((), ("spring:2", "torque_offset:2"), ("spring:2", "cogging:2:order=7")):
-        settings = design_excitation.Settings(robot="rrr", harmonics=(8,), evaluations=2, rehearse=False, discriminate=causes)
+        settings = design_excitation.Settings(robot="rrr", harmonics=(8,), evaluations=2, discriminate=causes)
         folders.append(run_stage(design_excitation.STAGE, Request((), no_report=True), settings).folder)
     assert [str(one) for one in folders[:2]] == ["runs/rrr-tue/excitation/design-excitation",
                                                  "runs/rrr-tue/excitation-spring-2-torque_offset-2/design-excitation"]

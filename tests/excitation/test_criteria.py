@@ -12,8 +12,6 @@ from pipelines.excitation.criteria import (
     a_optimal,
     condition,
     d_optimal,
-    e_optimal,
-    frobenius,
     spectrum,
 )
 
@@ -29,8 +27,6 @@ def _inverse_trace(m: np.ndarray) -> complex:
 CRITERIA: dict[str, tuple[Criterion, Callable[[np.ndarray], complex]]] = {
     "condition": (lambda s: condition(s, 6), lambda m: 0.5 * (np.log(np.trace(np.linalg.matrix_power(m, 6))) + np.log(
         np.trace(np.linalg.matrix_power(np.linalg.inv(m), 6)))) / 6),
-    "E": (lambda s: e_optimal(s, 6), lambda m: 0.5 * np.log(np.trace(np.linalg.matrix_power(np.linalg.inv(m), 6))) / 6),
-    "frobenius": (frobenius, lambda m: 0.5 * np.log(np.trace(m) * np.trace(np.linalg.inv(m)))),
     "D": (d_optimal, lambda m: -0.5 * np.log(np.linalg.det(m)) / 6),
     "A": (lambda s: a_optimal(s, WEIGHTS), lambda m: 0.5 * np.log(_inverse_trace(m))),
 }
