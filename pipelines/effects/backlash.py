@@ -8,7 +8,6 @@ from math import pi, sqrt
 from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.perturbation import (
@@ -29,7 +28,7 @@ _NOTHING = 1e-6  # numerics: [N m] that leave the link in the middle of the gap 
 # thousandth of a gap of 6.6 mrad. Those of one shape moved a little, whose difference is a slope,
 # are few: they are worked out exactly.
 _SLOPES = 6  # numerics: shapes worked out exactly at most
-_LENGTH, _EARLY = 600, 400  # numerics: samples of a stretch, and before it
+_LENGTH = 600  # numerics: samples of a stretch
 _FEW, _SHORT = 4, 300  # numerics: gaps whose arrays cost hardly more than a call; samples then
 # Two stretches may differ by this share of the gap; a speed counts as a way in this time [s].
 _SEAM, _TICK = 1e-12, 1e-3  # numerics: rounding; [s]
@@ -167,54 +166,44 @@ def followed(t: Array, mass: Array, force: Array, gaps: Gaps) -> Array:
     """x (gaps, samples) [rad] of the link against its motor.
 
     Of t (samples,), mass [kg m^2] and force [N m] (gaps, samples), or (1, samples) where they are
-    those of all gaps. Over a sample, trapezoids; flank and film implicit.
+    those of all gaps. Over a sample, trapezoids; flank and film implicit. Stretches are followed
+    side by side, each settled at first on the flank that is pressed; those whose start then is not
+    where the one before ended are followed again from there.
     """
     length = _SHORT if len(gaps.half) <= _FEW else _LENGTH
-    samples, count = len(t), max(1, -(-(len(t) - 1) // length))
-    h = np.append(np.diff(t), 0.0)
-    m, f = (
-        np.append(0.5 * (x[:, 1:] + x[:, :-1]), np.zeros((len(x), 1)), axis=1)
-        for x in (mass, force)
-    )
-    early = np.arange(count) * length - _EARLY
-    steps = early + np.arange(length + _EARLY)[:, None]  # (steps, stretches)
-    within = np.where((steps >= 0) & (steps < samples - 1), steps, samples - 1)
-    inertia = np.where(m > 0.0, m, 1.0)  # outside the log no time goes by
-    start = _start(force[:, np.maximum(early, 0)], gaps)
-    x, v, seams = _moved(h[within], _stretched(inertia, within), _stretched(f, within), start, gaps)
-    for gap, half in enumerate(gaps.half):
-        place, speed = x[-1, gap, 0], v[gap, 0]
-        for k in range(1, count):
-            off = abs(place - x[_EARLY, gap, k]) + _TICK * abs(speed - seams[gap, k])
-            if off > _SEAM * half:
-                own, before = within[_EARLY:, k], (float(place), float(speed))
-                inert, pull = m[gap % len(m), own], f[gap % len(f), own]
-                again = _step_by_step(h[own], inert, pull, before, gaps, gap)
-                x[_EARLY:, gap, k], v[gap, k] = again
-            place, speed = x[-1, gap, k], v[gap, k]
-    along = x[_EARLY + 1 :].transpose(1, 2, 0).reshape(len(gaps.half), -1)
-    return np.concatenate([x[_EARLY, :, :1], along], axis=1)[:, :samples]
+    steps, count = len(t) - 1, max(1, -(-(len(t) - 1) // length))
+    rest = count * length - steps  # behind the log no time goes by
+
+    def stretched(x: Array, fill: float) -> Array:
+        """x (rows, steps) as (length, rows, stretches)."""
+        padded = np.concatenate([x, np.full((len(x), rest), fill)], axis=1)
+        return np.ascontiguousarray(padded.reshape(len(x), count, length).transpose(2, 0, 1))
+
+    h = stretched(np.diff(t)[None], 0.0)
+    m, f = (stretched(0.5 * (x[:, 1:] + x[:, :-1]), 1.0) for x in (mass, force))
+    first = np.arange(count) * length
+    x = gaps.half[:, None] * np.sign(force[:, first]) + force[:, first] / gaps.stiffness[:, None]
+    v, out = np.zeros_like(x), np.empty((length + 1, *x.shape))
+    ends, some = np.zeros((2, *x.shape)), np.arange(count)
+    while len(some):
+        own = h[..., some], m[..., some], f[..., some]
+        out[..., some], ends[1][:, some] = _moved(*own, x[:, some], v[:, some], gaps)
+        ends[0] = out[-1]
+        off = np.abs(ends[0, :, :-1] - x[:, 1:]) + _TICK * np.abs(ends[1, :, :-1] - v[:, 1:])
+        some = 1 + np.flatnonzero((off > _SEAM * gaps.half[:, None]).any(axis=0))
+        x[:, some], v[:, some] = ends[:, :, some - 1]
+    along = out[1:].transpose(1, 2, 0).reshape(len(x), -1)
+    return np.concatenate([out[0, :, :1], along], axis=1)[:, : len(t)]
 
 
-def _stretched(x: Array, within: npt.NDArray[np.intp]) -> Array:
-    """x (gaps, samples) at `within` (steps, stretches), as (steps, gaps, stretches)."""
-    return np.ascontiguousarray(x[:, within].transpose(1, 0, 2))
+def _moved(h: Array, m: Array, f: Array, x: Array, v: Array, gaps: Gaps) -> tuple[Array, Array]:
+    """x (steps + 1, gaps, stretches), and v (gaps, stretches) at the end, from x and v.
 
-
-def _start(force: Array, gaps: Gaps) -> Array:
-    """x (gaps, stretches) settled on the flank that the force presses on."""
-    return np.asarray(gaps.half[:, None] * np.sign(force) + force / gaps.stiffness[:, None])
-
-
-def _moved(h: Array, m: Array, f: Array, x: Array, gaps: Gaps) -> tuple[Array, Array, Array]:
-    """x (steps + 1, gaps, stretches), v (gaps, stretches) at the end, and where a stretch begins.
-
-    Of h (steps, stretches), m and f (steps, gaps, stretches), or one for all gaps.
+    Of h (steps, 1, stretches), m and f (steps, gaps, stretches), or one for all gaps.
     """
     k, d, half = gaps.stiffness[:, None], gaps.damping[:, None], gaps.half[:, None]
-    h = h[:, None]
-    out, v = np.empty((len(h) + 1, *x.shape)), np.zeros_like(x)
-    out[0], seams = x, v
+    out = np.empty((len(h) + 1, *x.shape))
+    out[0] = x
     drag, more = 0.5 * h * gaps.film[:, None], 0.5 * h * d + 0.25 * h * h * k
     given, push, half_step = h * f, h * k, 0.5 * h
     for i in range(len(h)):
@@ -225,26 +214,4 @@ def _moved(h: Array, m: Array, f: Array, x: Array, gaps: Gaps) -> tuple[Array, A
         x = x + half_step[i] * (v + after)
         v = after
         out[i + 1] = x
-        if i + 1 == _EARLY:
-            seams = v
-    return out, v, seams
-
-
-def _step_by_step(
-    h: Array, m: Array, f: Array, start: tuple[float, float], gaps: Gaps, gap: int
-) -> tuple[Array, float]:
-    """x (samples,) of one gap from where the stretch before ended, and the speed at the end."""
-    k, d, half, film = (float(x[gap]) for x in (gaps.stiffness, gaps.damping, gaps.half, gaps.film))
-    x, v = start
-    found = [x]
-    for step, inertia, pull in zip(h.tolist(), m.tolist(), f.tolist(), strict=True):
-        if step:
-            over = x - min(max(x, -half), half)
-            slowing = 0.5 * step * film
-            if (k * over + d * v) * over > 0.0:
-                slowing, pull = slowing + 0.5 * step * d + 0.25 * step * step * k, pull - k * over
-            after = (v * (inertia - slowing) + step * pull) / (inertia + slowing)
-            x += 0.5 * step * (v + after)
-            v = after
-        found.append(x)
-    return np.array(found), v
+    return out, v

@@ -23,7 +23,6 @@ _SLIDES = 1e-12  # numerics: of the largest bending
 _LEAST = 0.05  # numerics: exponent of elements: below, all slip as one
 _ELEMENTS = 12  # numerics: that slip one after the other
 _FAST = 20.0  # numerics: times the speed over which a breakaway falls: nothing of it is left
-_SIDE_BY_SIDE = 256  # numerics: stretches of a motion
 
 
 @dataclass(frozen=True)
@@ -275,21 +274,12 @@ def _sliding_level(v: Any, breakaway: float, speed: float, m: Functions) -> Any:
 
 
 def _recursion(kept: Array, added: Array) -> Array:
-    """Return (steps + 1,) x_(k+1) = kept_k x_k + added_k from 0.
+    """Return (steps + 1,) x_(k+1) = kept_k x_k + added_k from 0: a banded triangular system."""
+    from scipy.linalg.blas import dtbsv
 
-    Worked out in many stretches side by side that are then joined.
-    """
-    long = max(1, -(-len(kept) // _SIDE_BY_SIDE))
-    a, b = np.ones(_SIDE_BY_SIDE * long), np.zeros(_SIDE_BY_SIDE * long)
-    a[: len(kept)], b[: len(kept)] = kept, added
-    a, b = (np.ascontiguousarray(x.reshape(_SIDE_BY_SIDE, long).T) for x in (a, b))
-    for k in range(1, long):
-        b[k] += a[k] * b[k - 1]
-        a[k] *= a[k - 1]
-    first = [0.0]
-    for factor, more in zip(a[-1, :-1].tolist(), b[-1, :-1].tolist(), strict=True):
-        first.append(factor * first[-1] + more)
-    return np.append(0.0, (a * np.array(first) + b).T.ravel()[: len(kept)])
+    band = np.zeros((2, len(kept) + 1), order="F")
+    band[1, :-1] = -kept
+    return np.asarray(dtbsv(1, band, np.append(0.0, added), lower=1, diag=1))
 
 
 def _strokes(q: Array) -> tuple[npt.NDArray[np.intp], Array, npt.NDArray[np.intp], Array]:

@@ -4,27 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import inf, isfinite, pi, sqrt
 from typing import Self
 
 import numpy as np
 
-from pipelines.dynamics.body import Array, Motion
+from pipelines.dynamics.body import Array, Motion, RigidBody
 from pipelines.dynamics.perturbation import (
-    deflection,
-    oscillation,
     perturbed_by,
     rate_of,
     rigid_slopes,
     rigid_torque,
     shifted,
+    torque_slopes,
 )
 from pipelines.effects.base import ArmModel, Effect, Hooks, Values, friction_at
 from pipelines.effects.hooks import DriveApart
 
-__all__ = ["BaseResonance", "JointElasticity"]
+__all__ = ["BaseResonance", "JointElasticity", "deflection", "oscillation"]
 
 _FIRST = 0  # numerics: the joint whose axis the base turns about
+_ROUNDS = 3  # numerics: each leaves what is of higher order in the deflection
+_SETTLED = 1e-6  # numerics: of the deflection: less is no correction
+_LEAST = 0.1  # numerics: of the inertia that a joint feels: what stays beyond its spring at least
 
 
 @dataclass(frozen=True)
@@ -220,3 +223,120 @@ def _felt(arm: ArmModel, q: Array, index: int) -> float:
     """Inertia [kg m^2] that the joint feels, the others held, averaged over q (samples, joints)."""
     some = q[:: max(1, len(q) // 200)]
     return float(np.mean(arm.body.mass_matrix(some, arm.p)[:, index, index]))
+
+
+def deflection(
+    body: RigidBody,
+    p: Array,
+    motion: Motion,
+    index: int,
+    stiffness: float,
+    damping: float,
+    inertia: float,
+) -> tuple[Array, Array, Array]:
+    """Return x, ẋ, ẍ (samples,) of the deflection of a joint of the rigid arm on a spring.
+
+        k x + d ẋ + I (q̈ + ẍ) + τ_j(q + x) = 0    for I < 0: a motor counted with its link
+        k x + d ẋ + I ẍ + τ_j(q + x) = 0          for I > 0: a base below the joint
+
+    That is exact, with what the arm then needs, by Newton's method: what is linear in x has
+    coefficients that vary with time and is solved from sample to sample.
+    """
+
+    def by_parameters(there: Motion) -> Array:
+        return np.ascontiguousarray(body.regressor(there.q, there.dq, there.ddq)[:, index])
+
+    # the slopes of τ_j are linear in p: what multiplies it is kept with the motion
+    key = ("slopes of the regressor", body, index)
+    slopes = motion.kept(key, lambda: torque_slopes(by_parameters, motion, index))
+    spring, drag, mass = slopes @ p
+    mass = np.maximum(mass + inertia, _LEAST * mass)
+    drag, spring = drag + damping, np.maximum(spring + stiffness, 0.5 * stiffness)
+    oscillator = _Oscillator(motion.t, mass, drag, spring)
+    x, rate, second = np.zeros((3, len(motion.t)))
+    tau = rigid_torque(body, p, motion)[:, index]
+    for _ in range(_ROUNDS):
+        load = tau + inertia * (second if inertia > 0.0 else motion.ddq[:, index] + second)
+        more = oscillator.response(-(stiffness * x + damping * rate + load))
+        x, rate, second = (a + b for a, b in zip((x, rate, second), more, strict=True))
+        if np.abs(more[0]).max(initial=0.0) < _SETTLED * np.abs(x).max(initial=0.0):
+            break
+        there = shifted(motion, index, x, rate, second)
+        tau = body.torque(there.q, there.dq, there.ddq, p)[:, index]
+    return x, rate, second
+
+
+def oscillation(
+    t: Array, mass: Array, drag: Array, spring: Array, force: Array
+) -> tuple[Array, Array, Array]:
+    """Return x, ẋ, ẍ (samples,) of m ẍ + c ẋ + k x = f, settled at the first sample."""
+    return _Oscillator(t, mass, drag, spring).response(force)
+
+
+@dataclass(frozen=True, eq=False)
+class _Oscillator:
+    """m ẍ + c ẋ + k x = f with coefficients (samples,) that vary with time.
+
+    Within a sample coefficients are held and the force is a straight line of slope s: exact for
+    that, however stiff.
+
+        x = (f + s t)/k - c s/k² + e^(-at) (A cos wt + B sin wt),    a = c/2m,    w² = k/m - a²
+    """
+
+    t: Array  # [s]
+    mass: Array
+    drag: Array
+    spring: Array
+
+    def response(self, force: Array) -> tuple[Array, Array, Array]:
+        """Return x, ẋ, ẍ (samples,), settled at the first sample.
+
+        x = f/k + y: what remains for y is small where the spring is stiff, so that no digits are
+        lost there.
+        """
+        still = force / self.spring
+        rate = rate_of(still, self.t)
+        second = rate_of(rate, self.t)
+        rest = -(self.mass * second + self.drag * rate)
+        y, dy = self._propagated(rest)
+        return still + y, rate + dy, second + (rest - self.drag * dy - self.spring * y) / self.mass
+
+    @cached_property
+    def _held(self) -> tuple[Array, ...]:
+        """The intervals h, and m, c, k in them (samples - 1,)."""
+        each = self.mass, self.drag, self.spring
+        return np.diff(self.t), *(0.5 * (z[1:] + z[:-1]) for z in each)
+
+    @cached_property
+    def _along(self) -> Array:
+        """A (2, 2, intervals): y and ẏ at the end of an interval by those at its start."""
+        h, m, c, k = self._held
+        a = 0.5 * c / m
+        w = np.sqrt((k / m - a * a).astype(complex))
+        one, other = np.exp((1j * w - a) * h), np.exp((-1j * w - a) * h)
+        cos = 0.5 * (one + other).real  # e^(-at) cos wt
+        sinc = ((one - other) / np.where(w == 0.0, 1.0, 2j * w)).real  # e^(-at) sin wt / w
+        sinc = np.where(w == 0.0, h * one.real, sinc)
+        return np.array([[cos + a * sinc, sinc], [-sinc * k / m, cos - a * sinc]])
+
+    def _propagated(self, f: Array) -> tuple[Array, Array]:
+        """Return y and ẏ (samples,) of m ÿ + c ẏ + k y = f.
+
+        z' = A z + b from interval to interval is a banded triangular system, solved forwards.
+        """
+        from scipy.linalg.blas import dtbsv
+
+        h, _, c, k = self._held
+        s = np.diff(f) / h
+        lag = c * s / k**2
+        before, after, speed = f[:-1] / k - lag, f[1:] / k - lag, s / k
+        moved = np.einsum("ijn,jn->in", self._along, np.array([before, speed]))
+        z = np.zeros((len(f), 2))
+        z[1:] = (np.array([after, speed]) - moved).T
+        if len(h):
+            z[0] = before[0], speed[0]  # it does not ring
+        band = np.zeros((4, z.size), order="F")
+        for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            band[2 + i - j, j:-2:2] = -self._along[i, j]
+        y, dy = dtbsv(3, band, z.ravel(), lower=1, diag=1).reshape(z.shape).T
+        return y, dy

@@ -25,7 +25,6 @@ import numpy as np
 
 from pipelines.dynamics.base_parameters import BaseArm
 from pipelines.dynamics.body import RigidBody
-from pipelines.dynamics.consistency import rrr_inequalities
 from pipelines.dynamics.rrr import RRR, combined
 from pipelines.estimation.config import ConsistencyConfig
 from pipelines.estimation.estimate import Estimate
@@ -37,23 +36,12 @@ _ROUNDING = 1e-13  # numerics: of a Hessian with unit diagonal
 
 
 @dataclass(frozen=True)
-class Inequal:
-    """A condition that positive mass puts on the parameters."""
-
-    condition: str
-    value: float
-    std: float
-    holds: bool  # or cannot be said to be broken
-
-
-@dataclass(frozen=True)
 class Consistent:
     """Whether links that could exist have the estimated parameters."""
 
     consistent: bool
     distance: float  # [standard deviations] to the nearest parameters that could
     violating: tuple[str, ...]  # links without whose condition they would
-    inequalities: tuple[Inequal, ...]  # of the RRR arm
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +56,7 @@ class Consistency:
 
 
 def consistency(found: Estimate, body: RigidBody) -> Consistent | None:
-    """Return whether links could have these parameters; for the RRR arm also what (A4) says.
+    """Return whether links could have these parameters.
 
     None where a parameter is not determined: nothing can be said of links then.
     """
@@ -80,15 +68,14 @@ def consistency(found: Estimate, body: RigidBody) -> Consistent | None:
     beta[kept] = found.beta[:own]
     covariance[np.ix_(kept, kept)] = found.robust.covariance[:own, :own]
     if isinstance(body, RRR):
-        combine, rules = combined(body.robot), rrr_inequalities(beta, covariance)
+        combine = combined(body.robot)
     elif isinstance(body, BaseArm):
-        combine, rules = body.base.combine, ()
+        combine = body.base.combine
     else:
         raise TypeError(f"no links are known behind a {type(body).__name__}")
     answer = physical_consistency(beta[kept], covariance[np.ix_(kept, kept)], combine[kept])
     names = tuple(body.robot.joints[i].name for i in answer.violating)
-    inequalities = tuple(Inequal(r.name, r.value, r.std, r.satisfied) for r in rules)
-    return Consistent(answer.consistent, answer.distance, names, inequalities)
+    return Consistent(answer.consistent, answer.distance, names)
 
 
 def _pseudo_map() -> Array:

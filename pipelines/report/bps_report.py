@@ -288,13 +288,6 @@ def _trust_section(result: Result) -> Section:
     )
     caption = "The directions that these logs show worst; 1 is a column on its own."
     tables = [Table(("singular value", "combination"), weak, caption)]
-    if result.consistency is not None and result.consistency.inequalities:
-        rows = tuple(
-            (_formula(i.condition), with_std(i.value, i.std), "yes" if i.holds else "no")
-            for i in result.consistency.inequalities
-        )
-        caption = "What positive mass demands of these parameters."
-        tables.append(Table(("condition", "value", "holds"), rows, caption))
     if result.balance is not None:
         tables.append(_balance_table(result, result.balance))
     text = (

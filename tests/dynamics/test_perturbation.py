@@ -10,12 +10,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pipelines.dynamics.body import Array, Motion
-from pipelines.dynamics.perturbation import (
-    deflection,
-    oscillation,
-    perturbed_torque,
-    shifted,
-)
+from pipelines.dynamics.perturbation import perturbed_torque, shifted
+from pipelines.effects.soft import deflection, oscillation
 from tests.dynamics.rrr_arms import random_states
 from tests.simulation.arms import Case, rrr
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from pipelines.dynamics.consistency import Inequality
 from pipelines.estimation.consistency import physical_consistency, pseudo_inertia
 from pipelines.io.log import Array
 
@@ -111,10 +110,3 @@ def test_what_is_uncertain_is_not_impossible() -> None:
     for unsure in (10.0, np.inf):
         std[4] = unsure
         assert physical_consistency(beta, np.diag(std**2), np.eye(20)).consistent
-
-
-@pytest.mark.parametrize(("value", "std", "satisfied"), [(0.1, 0.01, True), (-0.1, 0.01, False), (-0.02, 0.01, True),
-                                                         (-0.1, float("inf"), False)])
-def test_an_inequality_knows_its_uncertainty(value: float, std: float, satisfied: bool) -> None:
-    """Violated is what lies more than three std below zero."""
-    assert Inequality("moment > 0", value, std).satisfied is satisfied
