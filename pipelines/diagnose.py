@@ -37,7 +37,7 @@ from pipelines.stage import Beside, Inputs, Request, Stage, read_logs
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
-_CUT = 3  # causes named of those that --max-causes cut off
+_CUT = 3  # numerics: causes named of those that --max-causes cut off
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,7 @@ import pytest
 
 REPO = Path(__file__).resolve().parents[1]
 # Areas not yet moved to the layout of the design: the list only shrinks, and so does each number.
-CONSTANTS = {
-    "pipelines/diagnose.py": 1, "pipelines/diagnosis": 9,
-    "pipelines/report": 60,
-}
+CONSTANTS: dict[str, int] = {}
 
 
 @pytest.mark.parametrize("area", sorted(

@@ -24,7 +24,7 @@ __all__ = ["Baseline", "Parts", "Sums", "baseline"]
 
 Sums = tuple[Array, tuple[Array, ...]]  # B Cᵀ, and C Cᵀ of each group
 
-_SPLITS = 6  # of the reference into two
+_SPLITS = 6  # numerics: of the reference into two
 _HALF = 0.5  # numerics: of a fault's power, what a family explains that is like its own
 _RIDGE = 1e-9  # numerics: of unit nominal columns, which may be dependent
 

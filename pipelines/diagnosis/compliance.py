@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pipelines.diagnosis.config import RESPONSES
 from pipelines.diagnosis.result import Answer, NotIdentifiable
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.effects import all_effects, find_effect
@@ -23,8 +24,6 @@ from pipelines.io.log import ExperimentLog
 
 __all__ = ["Compliance", "compliance", "new_causes", "untold"]
 
-_MOVED = 3.0  # standard deviations of a frequency or stiffness, beyond which it has changed
-_SAME = 0.03  # of it, within which sessions show the same one: temperature, how the arm stood
 _NO_RESPONSES = (
     "a gap is distinguished from a spring by frequency responses that show none, "
     "and there is no frf log"
@@ -77,7 +76,9 @@ def _moved(now: Acting, before: Acting) -> bool:
     # a joint's frequency moves with the posture, its stiffness does not
     one, other = now.parameters[0], before.parameters[0]
     spread = float(np.hypot(one.std or 0.0, other.std or 0.0))
-    return abs(one.value - other.value) > max(_MOVED * spread, _SAME * other.value)
+    return abs(one.value - other.value) > max(
+        RESPONSES.deviations * spread, RESPONSES.alike * other.value
+    )
 
 
 def untold(told: Compliance | None, without: Sequence[str] = ()) -> tuple[NotIdentifiable, ...]:

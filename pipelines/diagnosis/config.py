@@ -6,7 +6,29 @@ from dataclasses import dataclass
 
 from pipelines.estimation.estimate import Recipe
 
-__all__ = ["DiagnosisConfig"]
+__all__ = ["LIMITS", "RESPONSES", "DiagnosisConfig"]
+
+
+@dataclass(frozen=True)
+class LimitsConfig:
+    """Numbers of the detection limits; no verdict depends on them."""
+
+    power: float = 1.65  # normal deviate of 95 %, one-sided (Cohen 1988)
+    worst: float = 0.25  # share of the shapes of a cause that may be seen worse than its limit says
+    visible: float = 0.02  # share of a column that the model does not imitate, below which: nothing
+    main: float = 0.1  # of a column: a parameter that makes up less of it does not hide it
+
+
+@dataclass(frozen=True)
+class ResponsesConfig:
+    """When a mode of the reference has changed."""
+
+    deviations: float = 3.0  # standard deviations of a frequency or stiffness
+    alike: float = 0.03  # share of it, by which temperature and posture move it between sessions
+
+
+LIMITS = LimitsConfig()
+RESPONSES = ResponsesConfig()
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from pipelines.estimation.joint_table import Array, Indices, by_joint
 __all__ = ["DIRECTIONS", "Window", "push_of", "windows_of"]
 
 _TOUCHED = 0.01  # numerics: of the largest effect of a push, from which a row is touched by it
-DIRECTIONS = 3  # components of a force
+DIRECTIONS = 3  # numerics: components of a force
 
 
 @dataclass(frozen=True)

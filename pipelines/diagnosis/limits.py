@@ -23,6 +23,7 @@ import numpy as np
 
 from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.candidates import Group
+from pipelines.diagnosis.config import LIMITS
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.result import (
     DetectionLimit,
@@ -40,10 +41,6 @@ from pipelines.friction.laws import LADDER
 
 __all__ = ["Limits", "limits_of", "without_limit"]
 
-_SIDE = 1.65  # normal deviate of 95 %, one-sided
-_QUARTER = 0.25  # of the shapes of a cause, that may be seen worse than its limit says
-_VISIBLE = 0.02  # share of a column that the model does not imitate, below which nothing is seen
-_MAIN = 0.1  # of a column: a parameter that makes up less of it does not hide it
 _TOO_MUCH = "these logs cannot show it: no arm has so much of it that they would"
 
 
@@ -109,16 +106,17 @@ def _limit(
     """Return the smallest of a cause that would have been found, or why none would."""
     visible = max(one.identifiability for one in shapes)
     first = shapes[0].effect
-    if visible < _VISIBLE:
+    if visible < LIMITS.visible:
         reason = f"absorbed by {_hiding(later, shapes[0])}; needs other motion"
         return NotIdentifiable(first.name, first.joint, reason, first.words.experiment)
     needed = {
-        one.freedom: np.sqrt(baseline.threshold(one.group, one.freedom, later.rows.count)) + _SIDE
+        one.freedom: np.sqrt(baseline.threshold(one.group, one.freedom, later.rows.count))
+        + LIMITS.power
         for one in shapes
     }
     if first.parameters.fixed is None:
         reach = [np.sqrt(max(s.hidden[0, 0], 0.0)) / needed[s.freedom] for s in shapes]
-        one = shapes[int(np.argsort(reach)[int(_QUARTER * (len(reach) - 1))])]
+        one = shapes[int(np.argsort(reach)[int(LIMITS.worst * (len(reach) - 1))])]
         least = needed[one.freedom] / np.sqrt(max(one.hidden[0, 0], 1e-300))
         share = later.shares[later.dictionary.groups.index(one.group)]
         usual = later.usual / np.maximum(one.length[0] * np.sqrt(share), 1e-300)  # (joints,)
@@ -175,7 +173,7 @@ def _hiding(later: Later, one: _Shape) -> str:
     """Return the names of the nominal parameters that imitate a shape."""
     names = [column.name for column in later.dataset.model.columns.names]
     share = one.cross[: len(names)].max(axis=1)
-    most = [n for n, x in zip(names, share, strict=True) if x > _MAIN]
+    most = [n for n, x in zip(names, share, strict=True) if x > LIMITS.main]
     return ", ".join(most) or "all base parameters together"
 
 

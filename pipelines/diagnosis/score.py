@@ -28,7 +28,7 @@ __all__ = ["Blocks", "confidence_set", "log_scores", "probabilities"]
 
 K = TypeVar("K", bound=Hashable)
 
-_SEED = 1
+_SEED = 1  # numerics: of the bootstrap
 _RESAMPLES = 400  # numerics: of the bootstrap
 
 

@@ -14,6 +14,7 @@ from pipelines.estimation.config import BalanceConfig
 from pipelines.estimation.nominal import column_in_words
 from pipelines.estimation.result import Estimated, Result
 from pipelines.report import style
+from pipelines.report.config import REPORT
 from pipelines.report.figures import Array, compared_figure, legend_above, one_figure
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone, columns_table
 from pipelines.report.sections import boundary_card
@@ -24,13 +25,8 @@ from pipelines.report.words import figure_in_words, joined
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_GOOD = 0.1  # relative torque error that is worth calling good
-_POOR = 0.5  # one that explains too little to be used
-_SURE = 3.0  # standard deviations: a value that is clearly visible
-_ABOVE_NOISE = 10.0  # times the noise between periods, as in a diagnosis: the model lacks something
-_STANDS_OUT = 2.0  # times the overall relative error: a joint worth naming
-_CURVES = 8  # in one axes
-_FAR = 4  # described values that are named
+_CURVES = 8  # numerics: in one axes
+_FAR = 4  # numerics: described values that are named
 
 _say, _paragraphs = partial(sentence, "bps"), partial(paragraphs, "bps")
 _within = partial(figure_in_words, within=True)
@@ -53,11 +49,13 @@ def bps_report(result: Result) -> Report:
 
 def _tone(result: Result) -> Tone:
     error = result.relative_error["validate"]
-    if result.unresolved or result.physically_consistent is False or error >= _POOR:
+    if result.unresolved or result.physically_consistent is False or error >= REPORT.poor_error:
         return "bad"
     above, _ = _above_noise(result)
-    sound = not _worst_joints(result) and not _contradictions(result) and above <= _ABOVE_NOISE
-    return "good" if error < _GOOD and sound else "attention"
+    sound = (
+        not _worst_joints(result) and not _contradictions(result) and above <= REPORT.above_noise
+    )
+    return "good" if error < REPORT.good_error and sound else "attention"
 
 
 def _verdict(result: Result) -> str:
@@ -74,7 +72,7 @@ def _verdict(result: Result) -> str:
         result,
         judged=judged,
         error=error,
-        poor=not error < _POOR,
+        poor=not error < REPORT.poor_error,
         worst=_worst_joints(result),
         noise={"ratio": ratio, "joint": joint},
         seen=[_seen(p) for p in result.parameters],
@@ -93,7 +91,7 @@ def _worst_joints(result: Result) -> tuple[tuple[str, float], ...]:
     """(joint, relative error) of those that are explained far worse than the arm; worst first."""
     pairs = zip(result.torque_rms["validate"], result.torque_signal_rms["validate"], strict=True)
     errors = [left / whole if whole > 0.0 else 0.0 for left, whole in pairs]
-    least = max(_GOOD, _STANDS_OUT * result.relative_error["validate"])
+    least = max(REPORT.good_error, REPORT.outstanding * result.relative_error["validate"])
     far = [pair for pair in zip(result.joints, errors, strict=True) if pair[1] > least]
     return tuple(sorted(far, key=lambda pair: -pair[1]))
 
@@ -116,7 +114,7 @@ def _seen(p: Estimated) -> str:
         return "no"
     if not p.visible:
         return "barely"
-    return "clearly" if abs(p.value) > _SURE * p.std else "known to be small"
+    return "clearly" if abs(p.value) > REPORT.sure * p.std else "known to be small"
 
 
 def _signed(x: float) -> str:
@@ -192,7 +190,7 @@ def _parameter_section(result: Result) -> Section:
     farthest = [_within(name) for name in far[:_FAR]]
     text = _paragraphs(
         "parameters",
-        _SURE,
+        REPORT.sure,
         len(apart),
         len(far),
         farthest,

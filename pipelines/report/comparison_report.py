@@ -18,8 +18,8 @@ from pipelines.report.words import at_places, figure_in_words, unit_or_dash, wit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_SHOWN = 40  # lines of a table or a figure
-_NAMED = 3  # figures in the verdict
+_SHOWN = 40  # numerics: lines of a table or a figure
+_NAMED = 3  # numerics: figures in the verdict
 _VERDICTS = {
     "no-fault-found": "nothing wrong",
     "cause": "a cause is named",

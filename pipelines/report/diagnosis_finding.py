@@ -15,6 +15,7 @@ from pipelines.effects import find_effect
 from pipelines.estimation.residual_analysis import Proof
 from pipelines.io.log import Array
 from pipelines.report import style
+from pipelines.report.config import REPORT
 from pipelines.report.figures import (
     DASHED,
     Look,
@@ -49,11 +50,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _TURNING = Units()
-_HIDDEN = 2.0  # times the share of the whole: its own joint's share says something else
-_LITTLE, _PART = 0.3, 0.8  # of the means without the finding: what it leaves
-_COHERENT = 0.5  # measured points of a response that are drawn
-_ROOM = (0.5, 2.0)  # below and above what the modes reach
-_NO_TIP = 1e-9  # [m] no tip: nothing that is simulated and measured comes so near
+_ROOM = (0.5, 2.0)  # numerics: below and above what the modes reach
+_NO_TIP = 1e-9  # numerics: [m] no tip: nothing that is simulated and measured comes so near
 
 _say = partial(sentence, "diagnosis")
 
@@ -78,7 +76,7 @@ def finding_section(
         left: held-out torque error of each joint with all findings.
     """
     share = _own_share(one, nominal)
-    whole = len(nominal.identify) == 1 or not share > _HIDDEN * one.explained
+    whole = len(nominal.identify) == 1 or not share > REPORT.own_share * one.explained
     lasting = [other for other in beside if find_effect(other.cause).clock != "log"]
     offered = offer and find_effect(one.cause).clock != "log"
     other = None
@@ -263,7 +261,7 @@ def proof_figures(number: int, one: Finding, units: Units = _TURNING) -> list[Fi
     over = np.nansum if proof.against == "frequency" else np.nanmean
     sizes = [float(np.sqrt(over(np.square(shown)))) for shown in (proof.before, proof.after)]
     against = f"the time of {one.log}" if one.log else proof.against
-    caption = _say("proof", proof, against, torque, *sizes, _LITTLE, _PART)
+    caption = _say("proof", proof, against, torque, *sizes, REPORT.followed, REPORT.partly_followed)
     joint = f"The same residual of joint {proof.joint}"
     in_time = f"{joint} where the finding shows most, over time."
     draw, draw_in_time = (
@@ -327,7 +325,7 @@ def response_figures(number: int, one: Finding) -> list[Figure]:
 def draw_responses(axes: Axes, answers: Sequence[Answer], frequency: float) -> None:
     """Points that are coherent, and a line for each posture; the named frequency."""
     for k, one in enumerate(answers):
-        color, good = joint_colour(k), one.coherence >= _COHERENT
+        color, good = joint_colour(k), one.coherence >= REPORT.coherent
         look: Look = {"markersize": 2.0, "color": color, "alpha": 0.5}
         axes.loglog(one.frequency[good], one.measured[good], ".", **look)
         label = posture_words(one.posture, one.joint)

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Drawing
 
-_COLUMNS = 3  # small figures side by side
-_SHOWN = 6  # curves of a joint
+_COLUMNS = 3  # numerics: small figures side by side
+_SHOWN = 6  # numerics: curves of a joint
 _SPECTRA = {
     "order": "Orders of the joint's angle, from those on that its range resolves: a peak at k is a "
     "torque that repeats k times a turn.",

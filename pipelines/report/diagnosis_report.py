@@ -47,9 +47,9 @@ from pipelines.report.words import (
     without_keys,
 )
 
-_CANDIDATES = 40  # lines
+_CANDIDATES = 40  # numerics: lines
 _IN_RUN = "--set diagnose.model=FILE"
-_NEAR = 5  # explanations that are named where none is found
+_NEAR = 5  # numerics: explanations that are named where none is found
 _TONES: dict[str, Tone] = {
     "no-fault-found": "good",
     "cause": "bad",

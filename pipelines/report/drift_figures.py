@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Drawing
 
-_NAMED = 8  # items whose names have room below the axis
-_LETTERS = 14  # of a name there
+_NAMED = 8  # numerics: items whose names have room below the axis
+_LETTERS = 14  # numerics: of a name there
 
 
 @dataclass(frozen=True)

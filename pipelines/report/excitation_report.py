@@ -12,6 +12,7 @@ import numpy as np
 from pipelines.excitation.discrimination import Apart
 from pipelines.excitation.result import DrawnPlan, Result
 from pipelines.report import style
+from pipelines.report.config import REPORT
 from pipelines.report.figures import Array, envelope, joint_signal_figure, one_figure, rows_figure
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
 from pipelines.report.sections import NO_COLLISION_CHECK
@@ -22,14 +23,9 @@ from pipelines.report.words import unit_of, without_keys
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_DRAWN_PLANS = 6
-_NEAR_BOUND = 1.5  # times: what is farther from the bound is no percentage of it
-_DEAR = 0.02  # share of the cost that is worth naming
-_RIVALS = 0.8  # similarity from which two causes explain the same
-_SHOWN = 5e-5  # of the size of a motion: a smaller change is not shown
-_MUCH = 0.01  # of the size of a motion: a larger change belongs into the verdict
-_WIDE = 30.0  # ratio from which a scale must be logarithmic
-_WORTH = 0.6  # of a limit: where a signal stays farther away, drawing it would flatten the signal
+_DRAWN_PLANS = 6  # numerics: how it is drawn
+_SHOWN = 5e-5  # numerics: of the size of a motion: a smaller change is not shown
+_WIDE = 30.0  # numerics: ratio from which a scale must be logarithmic
 
 _say, _paragraphs = partial(sentence, "excitation"), partial(paragraphs, "excitation")
 
@@ -46,7 +42,7 @@ def excitation_report(result: Result) -> Report:
         _apart_section(result.apart),
         _certificate(result),
     )
-    smaller = _smaller(result) if result.shrunk < 1.0 - _MUCH else ""
+    smaller = _smaller(result) if result.shrunk < 1.0 - REPORT.much else ""
     alike = "" if result.apart is None else _alike(result.apart)
     verdict = _say("verdict", result, alike, smaller)
     shown = tuple(section for section in sections if section is not None)
@@ -67,21 +63,21 @@ def _smaller(result: Result) -> str:
 
 def _are_rivals(found: Apart | None) -> bool:
     """Whether a diagnosis of the log would call the two causes alternatives."""
-    return found is not None and found.after.similarity > _RIVALS
+    return found is not None and found.after.similarity > REPORT.alike
 
 
 def _alike(found: Apart) -> str:
     """How alike two causes look, and whether the plain design was kept."""
     before, after = (_similarity(one.similarity) for one in (found.before, found.after))
     a, b = map(without_keys, found.causes)
-    return _say("alike", a, b, before, after, found.changed, _RIVALS, _are_rivals(found))
+    return _say("alike", a, b, before, after, found.changed, REPORT.alike, _are_rivals(found))
 
 
 def _similarity(similarity: float) -> str:
     """With as many digits as it takes to be on its own side of what makes alternatives."""
     for digits in (2, 3):
         shown = float(f"{similarity:.{digits}g}")
-        if shown != _RIVALS and (shown > _RIVALS) == (similarity > _RIVALS):
+        if shown != REPORT.alike and (shown > REPORT.alike) == (similarity > REPORT.alike):
             return format_number(similarity, digits)
     return format_number(similarity, 4)
 
@@ -98,7 +94,7 @@ def _apart_section(found: Apart | None) -> Section | None:
         ("motion", "similarity", f"{a}, visible", f"{b}, visible", "condition number"),
         tuple((n, x.similarity, *x.identifiability, x.condition_number) for n, x in judged),
     )
-    return Section(f"Telling {a} from {b}", _paragraphs("apart", _RIVALS), (table,))
+    return Section(f"Telling {a} from {b}", _paragraphs("apart", REPORT.alike), (table,))
 
 
 def _key_figures(result: Result) -> Table:
@@ -195,7 +191,7 @@ def _limits(result: Result) -> Section:
     dear = [
         f"{one.quantity} of {'the tip' if one.joint is None else place(one.joint)}"
         for one in costly
-        if one.cost > _DEAR
+        if one.cost > REPORT.costly
     ]
     columns = ("joint", "of", "peak", "limit used", "unit", "of it [%]", "cost [%]")
     text = _paragraphs("limits", result, _smaller(result), dear[:3])
@@ -222,7 +218,7 @@ def _certificate(result: Result) -> Section | None:
     if result.lower_bound is None or result.condition_number is None:
         return None
     bound, number = result.lower_bound, result.condition_number
-    return Section("Certificate", _paragraphs("certificate", bound, number, _NEAR_BOUND))
+    return Section("Certificate", _paragraphs("certificate", bound, number, REPORT.near_bound))
 
 
 def _plans_report(result: Result) -> Report:
@@ -289,7 +285,7 @@ def _limited_figure(
     def draw_row(axis: Axes, j: int) -> None:
         axis.plot(*envelope(t, values[:, j]), color=style.BLUE, linewidth=1.0)
         for end in (ends[0][j], ends[1][j]):
-            if np.isfinite(end) and np.abs(values[:, j]).max() > _WORTH * abs(end):
+            if np.isfinite(end) and np.abs(values[:, j]).max() > REPORT.drawn_limit * abs(end):
                 axis.axhline(end, color=style.VERMILLION, linewidth=0.9, linestyle=(0, (5, 2)))
 
     return rows_figure(name, caption, joints, draw_row, label)

@@ -27,12 +27,12 @@ Mask = npt.NDArray[np.bool_]
 Span = tuple[float, float]
 Look = dict[str, Any]  # of a line or an area, as matplotlib takes it
 
-_LARGEST = 1e150  # beyond it the axis limits overflow; a damaged sample may be that large
+_LARGEST = 1e150  # numerics: beyond it the axis limits overflow; a damaged sample may be that large
 _SCALES = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
-_POINTS = 800  # of a curve among others
-_ROW = 0.8  # [inch] height of the axes of one joint
-_WIDE = 70  # characters of a legend that a figure is wide enough for
-DASHED = (0, (5, 1.5))
+_POINTS = 800  # numerics: of a curve among others
+_ROW = 0.8  # numerics: [inch] height of the axes of one joint
+_WIDE = 70  # numerics: characters of a legend that a figure is wide enough for
+DASHED = (0, (5, 1.5))  # numerics: how it is drawn
 
 
 def envelope(t: Array, x: Array, points: int = 1200) -> tuple[Array, Array]:

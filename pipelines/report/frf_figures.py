@@ -12,6 +12,7 @@ from pipelines.frequency.rational import Mode
 from pipelines.frequency.result import COHERENCE, Band, Curve, Method, Posture, same_bins
 from pipelines.frequency.spectra import Complex, ExcitedBand
 from pipelines.report import style
+from pipelines.report.config import REPORT
 from pipelines.report.figures import Array, Look, joint_colour, one_figure
 from pipelines.report.report import Figure
 from pipelines.report.sentences import sentence
@@ -21,11 +22,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
 _CONFIDENCE = float(np.sqrt(-np.log(0.05)))  # [std] radius of the disc that holds it with 95 %
-_DECADE = 5.0  # values that span more are drawn on a logarithmic axis
-_HIGHEST = 2.5  # of the level of the rigid body: what lies beyond is noise
-_LOW = 10.0  # [Hz] up to which friction and reversal are shown
-_GOOD = 0.5  # coherence of the points that are drawn beside a fit
-_RELIABLE = 0.3  # coherence of the points that set the scale
+_DECADE = 5.0  # numerics: values that span more are drawn on a logarithmic axis
+_HIGHEST = 2.5  # numerics: of the level of the rigid body: what lies beyond is noise
+_LOW = 10.0  # numerics: [Hz] up to which friction and reversal are shown
 _METHODS = {
     "direct": ("direct", style.ORANGE, 0.9, "-"),
     "indirect": ("indirect", style.GREEN, 1.6, (0, (4, 2))),
@@ -119,7 +118,7 @@ def _draw_confidence(size: Axes, phase: Axes, curve: Curve) -> None:
     turn = np.rad2deg(np.arcsin(np.minimum(share, 1.0)))  # of the disc, seen from the origin
     turn = np.where(share < 1.0, turn, 180.0)
     phase.fill_between(f, angle - turn, angle + turn, **look)
-    reliable = curve.coherence >= _RELIABLE
+    reliable = curve.coherence >= REPORT.scaled_by
     low, high = np.quantile(magnitude[reliable] if reliable.any() else magnitude, (0.0, 1.0))
     size.set_ylim(0.3 * low, 2.0 * high)
 
@@ -153,7 +152,9 @@ def mark_modes(axes: Sequence[Axes], modes: Sequence[Mode]) -> None:
 
 def _good_points(curve: Curve, posture: Posture) -> tuple[Array, Complex]:
     """Frequencies and values that are coherent and in the excited band."""
-    good = (curve.coherence >= _GOOD) & ExcitedBand(posture.excited).holds(curve.frequency)
+    good = (curve.coherence >= REPORT.coherent) & ExcitedBand(posture.excited).holds(
+        curve.frequency
+    )
     return curve.frequency[good], curve.value[good]
 
 

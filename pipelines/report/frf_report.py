@@ -11,6 +11,7 @@ from pipelines.errors import Check
 from pipelines.frequency.grouping import Finding, Open
 from pipelines.frequency.rational import Known
 from pipelines.frequency.result import Method, Posture
+from pipelines.report.config import REPORT
 from pipelines.report.frf_figures import (
     bode_figure,
     compliance_figure,
@@ -24,8 +25,7 @@ from pipelines.report.sentences import paragraphs, sentence
 from pipelines.report.style import format_number, with_std
 
 _PAPER = (np.array([0.0, 0.5 * np.pi]), np.array([0.0, 0.0]))  # [rad] (q2, q3) of Fig. 17
-_WRONG = 0.03  # beyond noise: a method this far off is said to be
-_BANDS = 4  # that are listed
+_BANDS = 4  # numerics: that are listed
 _UNITS = {
     "stiffness": "N m/rad",
     "damping": "N m s/rad",
@@ -222,7 +222,7 @@ def _three_methods(measured: Measured) -> Section:
     pairs = [(p, own[n]) for p, own in measured for n in ("direct", "indirect") if n in own]
     for p, m in pairs:
         off, at = m.difference, m.difference_at
-        bad = off is not None and off > _WRONG
+        bad = off is not None and off > REPORT.method_off
         percent, bands = None if off is None else 100.0 * off, _bands(m.coherence_below_0_7_hz)
         rows.append((*_place(p), m.method, percent, at if bad else None, bands))
         tones.append("attention" if bad else "neutral")

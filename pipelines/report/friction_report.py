@@ -16,6 +16,7 @@ from pipelines.friction.fit import Value
 from pipelines.friction.laws import law_named
 from pipelines.friction.result import JointResult, Result, Series
 from pipelines.report import style
+from pipelines.report.config import REPORT
 from pipelines.report.figures import Look, draw_measured, draw_modelled, envelope, rows_figure
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
 from pipelines.report.sections import data_quality
@@ -27,10 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Drawing
 
-_GOOD = 0.05  # of the speed error without friction: what the law has to leave
-_GOOD_TORQUE = 0.1  # of held-out torque, where nothing was simulated: the same
-_THIN = 0.01  # of the curve: a narrower band is hidden by the line
-_NEAR = 0.04  # of the fastest speed: the part of the curve where the sign of friction turns
+_THIN = 0.01  # numerics: of the curve: a narrower band is hidden by the line
 _GRAVITY = {
     "sine": "c in c sin q + c' cos q",
     "cosine": "c' in c sin q + c' cos q",
@@ -68,9 +66,9 @@ def _ratio(joint: JointResult) -> float | None:
 def _well(joint: JointResult) -> bool:
     if joint.validation.by:
         ratio = _ratio(joint)
-        return ratio is not None and ratio <= _GOOD
+        return ratio is not None and ratio <= REPORT.good_speed
     error = joint.validation.torque_error  # nothing was simulated
-    return joint.moved and error is not None and error < _GOOD_TORQUE
+    return joint.moved and error is not None and error < REPORT.good_torque
 
 
 def _tone(result: Result) -> Tone:
@@ -264,7 +262,7 @@ def _curve_figure(joint: JointResult) -> Figure:
         whole, near = drawing.subplots(1, 2, sharey=True, width_ratios=(3, 2))
         fastest = float(series.speed.max())
         draw_curve(whole, series, fastest)
-        draw_curve(near, series, _NEAR * fastest)
+        draw_curve(near, series, REPORT.near_rest * fastest)
         whole.set_ylabel(f"friction [{torque}]")
         drawing.supxlabel(f"speed [{speed}]", fontsize="medium")
         whole.legend(loc="upper left", borderpad=0.2)

@@ -22,7 +22,7 @@ from pipelines.report.figures import (
 )
 from pipelines.report.report import Figure
 
-_BUCKETS, _INTERVALS, _SPANS = 200, 100_000, 200
+_BUCKETS, _INTERVALS, _SPANS = 200, 100_000, 200  # numerics: how it is drawn
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from pipelines.estimation.mean_period import NoiseFloor
 from pipelines.estimation.motion_result import LogResult, ObserverResult, Series
 from pipelines.estimation.state_estimation import design
 from pipelines.report import style
+from pipelines.report.config import REPORT
 from pipelines.report.figures import (
     DASHED,
     Array,
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Drawing
 
-_CHANCE = 6.0  # standard deviations: noise is further off in one sample of 5e8
 _STYLES: tuple[Any, ...] = ("-", DASHED, (0, (1.5, 1.2)))  # joints that lie on each other
 
 _say, _paragraphs = partial(sentence, "motion"), partial(paragraphs, "motion")
@@ -105,7 +105,7 @@ def _strays(far: Sequence[LogResult]) -> dict[str, object] | None:
         "limit": float(limit),
         "published": float(limit) == ResultConfig().alarm,
         "noise": noise,
-        "chance": error < _CHANCE * noise,
+        "chance": error < REPORT.chance * noise,
         "logs": len(far),
     }
 

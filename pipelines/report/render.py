@@ -47,7 +47,7 @@ _WORDS: Final[dict[Tone, str]] = {
     "bad": "Problem",
     "neutral": "Result",
 }
-_PARAGRAPH = 4000  # characters; longer ones are cut
+_PARAGRAPH = 4000  # numerics: characters; longer ones are cut
 _NUMBER_AND_UNIT = re.compile(
     r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(%|°C|[mµnk]?(s|Hz|N|m|rad|g|A|V|W)\b|(min|deg|rev)\b))"
     r"|(?<=\bN) (?=m\b)|(?<=[\d)]) (?=[±×] [\d∞])|(?<=[±×]) (?=[\d∞])"

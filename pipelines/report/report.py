@@ -33,7 +33,7 @@ Cell = str | int | float | None  # of a table
 _NUMBER: Final = re.compile(
     r"\(?[−+-]?\d[\d\s.,]*(e[+-]?\d+)?(\s*±\s*[\d\s.,∞]+)?\)?(\s*×\s*10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(\s*%)?|[–—-]|"
 )
-_DIGITS = 6  # of the longest number that is still filled up with decimals
+_DIGITS = 6  # numerics: of the longest number that is still filled up with decimals
 
 
 @dataclass(frozen=True)

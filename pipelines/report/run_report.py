@@ -31,10 +31,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _WORST: tuple[Tone, ...] = ("neutral", "good", "attention", "bad")
-_FIGURES = 12  # of one stage: ten logs drawn four times each are for who asks for that stage
-_NAMED = 3  # logs that are left out
+_FIGURES = (
+    12  # numerics: of one stage: ten logs drawn four times each are for who asks for that stage
+)
+_NAMED = 3  # numerics: logs that are left out
 
-_SAME = 0.005  # three digits are shown
+_SAME = 0.005  # numerics: three digits are shown
 _COLOURS = (style.BLUE, style.VERMILLION, style.GREEN)
 
 _say = partial(sentence, "run")

@@ -29,7 +29,7 @@ _RESULTS: dict[Level, str] = {
     "reject": "not usable",
 }
 _ORDER: tuple[Level, ...] = ("reject", "repair", "warn", "ok")
-_LISTED = 40  # logs
+_LISTED = 40  # numerics: logs
 _UNKNOWN = "not identifiable"
 
 Row = tuple[str, str, str, Tone]  # quantity, estimate, meaning, tone

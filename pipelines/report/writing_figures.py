@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
 _AXES = ("x", "y", "z")
-_SEGMENTS = 600  # of a coloured path
-_WIDTH = 5.2  # [inch] of a path in a figure
-_LEFT = (1, 2, 3, 4)  # Fig. 16 has the first four cases on one side
+_SEGMENTS = 600  # numerics: of a coloured path
+_WIDTH = 5.2  # numerics: [inch] of a path in a figure
+_LEFT = (1, 2, 3, 4)  # numerics: Fig. 16 has the first four cases on one side
 _PARTS = {
     "inertia": style.BLUE,
     "coriolis": style.PURPLE,

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from pipelines.report import style
+from pipelines.report.config import REPORT
 from pipelines.report.figures import compared_figure
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
 from pipelines.report.sections import NO_COLLISION_CHECK
@@ -26,8 +27,7 @@ from pipelines.writing.control_cases import Case
 from pipelines.writing.task import Designed
 from pipelines.writing.validation import Result, TorqueValidation
 
-_MOST_ROWS = 40  # of the table of stretches
-_FELT = 0.5  # of what is left, from which on further effects are worth a column
+_MOST_ROWS = 40  # numerics: of the table of stretches
 _PARTS = ("inertia", "coriolis", "gravity", "friction", "effects")
 
 _say, _paragraphs = partial(sentence, "writing"), partial(paragraphs, "writing")
@@ -105,7 +105,7 @@ def _key_figures(result: Result) -> Table | None:
 
 
 def _torque_section(result: Result) -> Section:
-    felt = any((log.parts_rms["effects"] > _FELT * log.rms).any() for log in result.logs)
+    felt = any((log.parts_rms["effects"] > REPORT.felt * log.rms).any() for log in result.logs)
     parts = [name for name in _PARTS if felt or name != "effects"]
     rows = []
     for log in result.logs:
