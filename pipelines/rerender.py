@@ -1,6 +1,6 @@
 """Draw the report of a stored result again; nothing is computed.
 
-report, folder = rerender(folder)       in its place; with `out` elsewhere
+report = rerender(folder)       in its place; with `out` elsewhere
 """
 
 from __future__ import annotations
@@ -21,14 +21,13 @@ from pipelines.io.output import (
     PROVENANCE,
     environment_faults,
     hash_file,
-    listed_outputs,
+    provenance_of,
     refuse_foreign,
     refuse_place,
     remove_folder,
     staging_folder,
     tilde,
     write_text,
-    written_by,
 )
 from pipelines.io.results import (
     StoredResult,
@@ -60,38 +59,42 @@ def rerender(folder: Path, out: Path | None = None, force: bool = False) -> Repo
         EnvironmentFault: disk full, no permission; P08, a batch is at work there.
     """
     stored = read_result(folder)
-    home = stored.path.parent
-    is_batch = stored.command == "batch"
+    home, is_batch = stored.path.parent, stored.command == "batch"
     if out is not None:
         refuse_place(out, (stored.path,), (home,))
-        refuse_foreign(out, force)
-        if written_by(out) not in ("", "report") and not force:
-            words = f"holds the result of '{written_by(out)}'"
-            remedy = "choose another folder with --out, or replace it with --force"
-            raise UsageError("C05", words, where=out, remedy=remedy)
+        refuse_foreign(out, force, command="report")
     elif is_batch:
         claim(home, str(stored.object.get("stage")))
     else:
         refuse_foreign(home, force)
     report: Report = tilde(_report(stored))
-    about = _provenance(home)
+    about = provenance_of(home)
+    outputs = about.get("outputs")
+    if not isinstance(outputs, dict) or any(
+        ".." in PurePath(name).parts or name.startswith("/") for name in outputs
+    ):  # X11
+        raise InputRejected("F05", "has no provenance.json that says what it is", home, _AGAIN)
     footer = footer_of(stored.command, about.get("inputs", {}))
     if is_batch:
         footer = {"command": "rrrid batch", "version": __version__, "stage": about["stage"]}
     with locked(home / "ledger", home) if is_batch else contextlib.nullcontext():
-        _draw(report, home if out is None else out, footer)
+        drawn = _draw(report, out or home, footer)
         if out is None:
-            others = {n: sha for n, sha in about["outputs"].items() if not _is_drawn(n)}
-            about = about | {"outputs": others | _drawn(home)}
+            others = {name: sha for name, sha in outputs.items() if not _is_drawn(name)}
+            about = about | {"outputs": others | drawn}
         else:
             about = {"tool": "rrrid", "version": __version__, "command": "report"}
-            about |= {"inputs": {str(stored.path): hash_file(stored.path)}, "outputs": _drawn(out)}
+            about |= {"inputs": {str(stored.path): hash_file(stored.path)}, "outputs": drawn}
         write_text((out or home) / PROVENANCE, json_text(tilde(about)))
     return report
 
 
-def _draw(report: Report, folder: Path, footer: dict[str, str]) -> None:
-    """Draw beside the folder, and move what is drawn into it when all of it is there."""
+def _is_drawn(name: str) -> bool:
+    return name == "report.html" or name.startswith("figures/")
+
+
+def _draw(report: Report, folder: Path, footer: dict[str, str]) -> dict[str, str]:
+    """Draw beside the folder, move it all there, and return the files with their SHA-256."""
     with environment_faults(folder):
         folder.mkdir(parents=True, exist_ok=True)
         staging = staging_folder(folder)
@@ -103,15 +106,8 @@ def _draw(report: Report, folder: Path, footer: dict[str, str]) -> None:
                 os.replace(path, folder / path.name)
     finally:
         remove_folder(staging)
-
-
-def _drawn(folder: Path) -> dict[str, str]:
     files = [folder / "report.html", *sorted((folder / "figures").glob("*"))]
     return {path.relative_to(folder).as_posix(): hash_file(path) for path in files}
-
-
-def _is_drawn(name: str) -> bool:
-    return name == "report.html" or name.startswith("figures/")
 
 
 def _report(stored: StoredResult) -> Report:
@@ -135,31 +131,20 @@ def _report(stored: StoredResult) -> Report:
         raise UsageError("C02", words, where=stored.path, remedy=_AGAIN) from None
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as problem:
         words = f"does not hold what this version draws ({type(problem).__name__}: {problem})"
-        remedy = f"it was written by another version; {_AGAIN}"
-        raise InputRejected("S20", words, where=stored.path, remedy=remedy) from problem
+        raise InputRejected("S20", words, where=stored.path, remedy=_AGAIN) from problem
 
 
 def _series(stored: StoredResult) -> dict[str, Any]:
     """Return the long series that figures are drawn of, as they were written."""
     if '"$series"' not in json.dumps(stored.object):
         return {}
-    if not stored.series.is_file():
+    file = stored.series
+    if not file.is_file():
         words = "the series that its figures are drawn of are missing"
-        raise InputRejected("S01", words, where=stored.series, remedy=_AGAIN)
-    expected = listed_outputs(stored.path.parent).get(stored.series.name)
-    if expected is not None and expected != hash_file(stored.series):
+        raise InputRejected("S01", words, where=file, remedy=_AGAIN)
+    outputs = provenance_of(file.parent).get("outputs")
+    listed = outputs.get(file.name) if isinstance(outputs, dict) else None
+    if listed not in (None, hash_file(file)):
         words = "sha256 differs from provenance.json: it was changed since it was written"
-        raise InputRejected("F05", words, where=stored.series, remedy=_AGAIN)
-    return read_foreign_series(stored.series)
-
-
-def _provenance(folder: Path) -> dict[str, Any]:
-    try:
-        about: dict[str, Any] = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
-        dict(about.get("inputs", {}))
-        if any(".." in PurePath(name).parts or name.startswith("/") for name in about["outputs"]):
-            raise ValueError  # X11
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        words = "has no provenance.json that says what it is"
-        raise InputRejected("F05", words, where=folder, remedy=_AGAIN) from None
-    return about
+        raise InputRejected("F05", words, where=file, remedy=_AGAIN)
+    return read_foreign_series(file)

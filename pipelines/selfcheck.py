@@ -22,12 +22,9 @@ from pipelines import __version__
 from pipelines.errors import RrridError, clean
 from pipelines.io.files import Opened, open_log, write_log
 from pipelines.io.output import tilde
-from pipelines.io.processors import processors
 from pipelines.io.sessions import Inputs
 
 if TYPE_CHECKING:
-    from packaging.requirements import Requirement
-
     from pipelines.io.log import ExperimentLog
 
 __all__ = ["Finding", "examine", "self_test"]
@@ -35,11 +32,12 @@ __all__ = ["Finding", "examine", "self_test"]
 Level = Literal["ok", "warn", "bad"]
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+_EXTRAS = ("", "bench", "cluster", "export")
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at."""
+    """What was examined, and what to do where it is not in order."""
 
     name: str
     level: Level
@@ -59,20 +57,25 @@ def examine(with_self_test: bool = True) -> Iterator[Finding]:
     many = [f"{name}={os.environ[name]}" for name in _THREADS if os.environ.get(name, "1") != "1"]
     remedy = "one thread is the fastest here: unset them, rrrid sets 1 itself" if many else ""
     yield Finding("BLAS", "warn" if many else "ok", ", ".join(many) or "one thread", remedy)
-    usable = f"{processors()} of {os.cpu_count()} cores may be used"
-    yield Finding("processor", "ok", f"{usable}; rrrid batch takes them all")
-    remedy = "set TMPDIR to a folder that can be written"
-    yield _folder("temporary folder", lambda: Path(tempfile.gettempdir()), "bad", remedy)
-    remedy = "rrrid does not need it; matplotlib keeps its cache in the temporary folder"
-    yield _folder("HOME", Path.home, "warn", remedy)
-    remedy = "results go to ./runs by default: give --out"
-    yield _folder("working folder", Path.cwd, "warn", remedy)
+    folders: tuple[tuple[str, Callable[[], Path], Level], ...] = (
+        ("temporary folder", lambda: Path(tempfile.gettempdir()), "bad"),
+        ("HOME", Path.home, "warn"),
+        ("working folder", Path.cwd, "warn"),
+    )
+    for name, where, otherwise in folders:
+        try:
+            path = where()
+            with tempfile.NamedTemporaryFile(dir=path, prefix=".rrrid-doctor-"):
+                yield Finding(name, "ok", f"{tilde(path)} can be written")
+        except (OSError, RuntimeError) as problem:
+            words = f"cannot be written: {clean(problem, 100)}"
+            yield Finding(name, otherwise, words, "give --out, or set TMPDIR to another folder")
     if with_self_test:
         yield from self_test()
 
 
 def _libraries() -> Iterator[Finding]:
-    """Compare what is installed with what the package requires."""
+    """Compare what is installed with what the package requires; an extra may be missing."""
     from packaging.requirements import Requirement
 
     try:
@@ -83,71 +86,50 @@ def _libraries() -> Iterator[Finding]:
         return
     told = set[str]()
     for wanted in map(Requirement, lines):
-        extras = [
-            extra
-            for extra in ("", "bench", "cluster", "export")
-            if wanted.marker is None or wanted.marker.evaluate({"extra": extra})
-        ]
-        if extras and wanted.name not in told:
-            told.add(wanted.name)
-            yield _library(wanted, extras[0])
-
-
-def _library(wanted: Requirement, extra: str) -> Finding:
-    remedy = f"pip install --upgrade '{f'rrrid[{extra}]' if extra else wanted}'"
-    required = f"{wanted.specifier} is required{f' by the extra {extra}' if extra else ''}"
-    try:
-        version = importlib.metadata.version(wanted.name)
-    except importlib.metadata.PackageNotFoundError:
-        level: Level = "ok" if extra else "bad"
-        return Finding(wanted.name, level, f"not installed, {required}", remedy)
-    if wanted.specifier.contains(version, prereleases=True):
-        return Finding(wanted.name, "ok", version)
-    return Finding(wanted.name, "warn" if extra else "bad", f"{version}, {required}", remedy)
-
-
-def _folder(name: str, where: Callable[[], Path], otherwise: Level, remedy: str) -> Finding:
-    try:
-        path = where()
-        with tempfile.NamedTemporaryFile(dir=path, prefix=".rrrid-doctor-"):
-            return Finding(name, "ok", f"{tilde(path)} can be written")
-    except (OSError, RuntimeError) as problem:
-        return Finding(name, otherwise, f"cannot be written: {clean(problem, 100)}", remedy)
+        marker = wanted.marker
+        extras = [x for x in _EXTRAS if marker is None or marker.evaluate({"extra": x})]
+        if not extras or wanted.name in told:
+            continue
+        told.add(wanted.name)
+        extra = extras[0]
+        remedy = f"pip install --upgrade '{f'rrrid[{extra}]' if extra else wanted}'"
+        required = f"{wanted.specifier} is required{f' by the extra {extra}' if extra else ''}"
+        try:
+            version = importlib.metadata.version(wanted.name)
+        except importlib.metadata.PackageNotFoundError:
+            found = f"not installed, {required}"
+            yield Finding(wanted.name, "ok" if extra else "bad", found, remedy)
+            continue
+        if wanted.specifier.contains(version, prereleases=True):
+            yield Finding(wanted.name, "ok", version)
+        else:
+            yield Finding(wanted.name, "warn" if extra else "bad", f"{version}, {required}", remedy)
 
 
 def self_test() -> Iterator[Finding]:
     """Simulate a log, write, read and fit it, filter and draw: small jobs with known answers."""
     from pipelines.simulation.example import example_session
 
-    logs: list[ExperimentLog] = []
-
-    def simulated() -> str:
-        logs.append(example_session()[0])
-        return f"{logs[0].n_samples} samples in closed loop"
-
-    yield _tried("simulating a log", simulated)
-    if not logs:
-        return
+    log = example_session()[0]
     with tempfile.TemporaryDirectory(prefix="rrrid-doctor-") as folder:
-        for container, file in (("HDF5", "a.h5"), ("Parquet", "a.parquet")):
-            work = partial(_round_trip, Path(folder) / file, logs[0])
-            yield _tried(f"{container} log, written and read", work)
-        yield _tried("base parameters", partial(_fitted, logs[0]))
-    yield _tried("observer", _observed)
-    yield _tried("figure", _drawn)
-
-
-def _tried(name: str, work: Callable[[], str]) -> Finding:
-    began = time.perf_counter()
-    try:
-        words = work()
-    except RrridError as problem:
-        return Finding(f"self-test: {name}", "bad", problem.message, problem.remedy)
-    except Exception as problem:  # a missing, old or damaged library may raise anything
-        found = clean(f"{type(problem).__name__}: {problem}", 200)
-        remedy = "install rrrid anew into a fresh virtual environment"
-        return Finding(f"self-test: {name}", "bad", found, remedy)
-    return Finding(f"self-test: {name}", "ok", f"{words}, {time.perf_counter() - began:.1f} s")
+        for name, work in (
+            ("simulating a log", lambda: f"{log.n_samples} samples in closed loop"),
+            ("HDF5 log, written and read", partial(_round_trip, Path(folder) / "a.h5", log)),
+            ("Parquet log, written and read", partial(_round_trip, Path(folder) / "a.parquet", log)),
+            ("base parameters", partial(_fitted, log)),
+            ("observer", _observed),
+            ("figure", _drawn),
+        ):
+            began = time.perf_counter()
+            try:
+                words = f"{work()}, {time.perf_counter() - began:.1f} s"
+                yield Finding(f"self-test: {name}", "ok", words)
+            except RrridError as problem:
+                yield Finding(f"self-test: {name}", "bad", problem.message, problem.remedy)
+            except Exception as problem:  # a missing, old or damaged library may raise anything
+                found = clean(f"{type(problem).__name__}: {problem}", 200)
+                remedy = "install rrrid anew into a fresh virtual environment"
+                yield Finding(f"self-test: {name}", "bad", found, remedy)
 
 
 def _round_trip(path: Path, log: ExperimentLog) -> str:
@@ -166,7 +148,7 @@ def _fitted(log: ExperimentLog, close: float = 6.0) -> str:
     from pipelines.estimate_bps import Settings, compute
     from pipelines.simulation.example import example_arm
 
-    found = compute(Inputs((Opened(Path("log"), "", log, ()),)), Settings())
+    found = compute(Inputs((Opened(Path("log"), "", log, ()),)), Settings(compare=False))
     truth = {parameter.name: parameter.value for parameter in example_arm().base}
     away = [
         abs(one.value - truth[one.name]) / one.std

@@ -15,6 +15,7 @@ import platform
 import sys
 import time
 import typing
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -40,7 +41,6 @@ from pipelines.io.output import (
     slug,
     staging_place,
     tilde,
-    told_apart,
     write_file,
     write_text,
 )
@@ -359,11 +359,14 @@ def _remade(changed: Iterable[str]) -> Iterator[Check]:
 def footer_of(command: str, inputs: Mapping[str, str]) -> dict[str, str]:
     """Return the foot of a report: versions, and inputs (path -> SHA-256).
 
-    Each has the name of its file, or with the folders above it that distinguish it from others.
+    Each has the name of its file, one of several of that name with the folders above it.
     """
-    names = told_apart(inputs)
-    listed = sorted(inputs.items())[: REPORT.inputs]
-    named = {f"input {names[path]}": value[:16] for path, value in listed}
+    files = Counter(Path(path).name for path in inputs)
+    named = {}
+    for path, value in sorted(inputs.items())[: REPORT.inputs]:
+        name = Path(path).name
+        name = name if files[name] == 1 else str(Path(*Path(path).parts[-3:]))
+        named[f"input {name}"] = value[:16]
     return {"command": f"rrrid {command}", "version": __version__} | named
 
 

@@ -16,7 +16,6 @@ import platform
 import re
 import shutil
 import zlib
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
@@ -128,9 +127,8 @@ def remove_folder(folder: Path) -> None:
     """Remove a folder and all that is in it, wholly even if interrupted meanwhile."""
     try:
         shutil.rmtree(folder, ignore_errors=True)
-    except BaseException:
+    finally:
         shutil.rmtree(folder, ignore_errors=True)
-        raise
 
 
 def replace_folder(staging: Path, target: Path) -> None:
@@ -153,11 +151,7 @@ def replace_folder(staging: Path, target: Path) -> None:
             if old.exists():
                 os.replace(old, target)
             raise
-        try:
-            if old.exists():
-                shutil.rmtree(old)
-        finally:
-            remove_folder(old)
+        remove_folder(old)
         _sync(target.parent)
 
 
@@ -324,29 +318,15 @@ def short_names(paths: Iterable[Path]) -> dict[str, str]:
 
     A result then does not depend on where its inputs lie: equal inputs give equal bytes.
     """
-    roots = list(dict.fromkeys(path if os.path.isdir(path) else path.parent for path in paths))
+    roots = dict.fromkeys(path if os.path.isdir(path) else path.parent for path in paths)
     if len(roots) == 1:
-        return {str(roots[0]): ""}
+        return {str(root): "" for root in roots}
     names: dict[str, str] = {}
     for root in roots:
-        numbered = (f"{root.name}-{number}" for number in range(2, len(roots) + 2))
-        free = (name for name in (root.name, *numbered) if not name or name not in names.values())
-        names[str(root)] = next(free)
-    return names
-
-
-def told_apart(paths: Iterable[str]) -> dict[str, str]:
-    """Map every path to its last part, or to as many from its end as no other ends in."""
-    parts = {path: Path(path).parts for path in paths}
-    names: dict[str, str] = {}
-    depth = 0
-    while left := [path for path in parts if path not in names]:
-        depth += 1
-        ends = Counter(parts[path][-depth:] for path in left)
-        for path in left:
-            end = parts[path][-depth:]
-            if ends[end] == 1 or depth >= len(parts[path]):
-                names[path] = str(Path(*end))
+        name, number = root.name, 2
+        while name and name in names.values():
+            name, number = f"{root.name}-{number}", number + 1
+        names[str(root)] = name
     return names
 
 

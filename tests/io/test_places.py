@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from pipelines.errors import UsageError
-from pipelines.io.output import refuse_foreign, slug, tilde, told_apart
-from pipelines.stage import footer_of
+from pipelines.io.output import refuse_foreign, slug, tilde
 
 
 @pytest.mark.parametrize("text", ["../../etc/passwd", "/abs", "CON", "nul.h5", "", "ä" * 300, "a\nb", "..", "-rf", "con.parquet"])
@@ -27,17 +26,6 @@ def test_the_home_folder_is_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """X14: results and reports write ~ where a path goes through the user's home."""
     monkeypatch.setenv("HOME", "/home/alice")
     assert tilde({"/home/alice/a": ["/home/alice/logs/x.h5", 3]}) == {"~/a": ["~/logs/x.h5", 3]}
-
-
-def test_files_of_one_name_are_told_apart() -> None:
-    """By as many folders as that takes, and only those of one name: by what a report says at its foot none is lost."""
-    names = {"/x/monday/logs/1.h5": "monday/logs/1.h5", "/x/friday/logs/1.h5": "friday/logs/1.h5", "/x/friday/logs/2.h5": "2.h5",
-             "/y/1.h5": "y/1.h5", "1.h5": "1.h5"}
-    assert told_apart(names) == names
-    assert told_apart(["/1.h5", "/a/1.h5"]) == {"/1.h5": "/1.h5", "/a/1.h5": "a/1.h5"}
-    foot = footer_of("compare", {"/x/a/model.json": "0" * 64, "/x/b/model.json": "1" * 64})
-    assert {key: value for key, value in foot.items() if key.startswith("input")} == {
-        "input a/model.json": "0" * 16, "input b/model.json": "1" * 16}
 
 
 def test_a_folder_without_our_provenance_is_never_replaced(tmp_path: Path) -> None:
