@@ -10,7 +10,7 @@ check that needs a repair ("repair") or closes a gate ends in exit 1; a warning 
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -27,7 +27,6 @@ from pipelines.estimation.checks.plausibility import plausibility_findings
 from pipelines.io.files import Opened
 from pipelines.io.log import ExperimentLog, recording
 from pipelines.io.option import option
-from pipelines.io.robot import RobotDescription, format_robot
 from pipelines.io.schema import joint_unit
 from pipelines.quality.checks import NotTested, Subject, check_together, columns_first, findings
 from pipelines.quality.config import CONFIG
@@ -128,11 +127,18 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     previews: list[Preview] = []
     untested: list[NotTested] = []
     for opened in inputs.logs:
-        subject, items = _examine(opened, inputs.robot, settings)
-        subjects.append(subject)
+        subject = Subject(opened.log)
+        items = _examine(subject, opened, settings)
         checks = [item for item in items if isinstance(item, Check)]
         if inputs.material == _TRUST:  # within `run` there is no such option
-            checks = [_with_way_out(check) for check in checks]
+            way_out = f"; if all is right as it is, pass {_TRUST}"
+            checks = [
+                replace(check, remedy=f"{check.remedy}{way_out}")
+                if check.code in TRUSTED and check.level == "reject"
+                else check
+                for check in checks
+            ]
+        subjects.append(subject)
         found += checks
         untested += [item for item in items if isinstance(item, NotTested)]
         logs.append(_summary(opened, subject, (*opened.checks, *checks)))
@@ -159,26 +165,11 @@ def _as_check(error: RrridError, path: object) -> Check:
     return Check(error.code, "reject", error.message, error.where or str(path), error.remedy, True)
 
 
-def _with_way_out(check: Check) -> Check:
-    """Return S05 and S07 with the option for users who know better."""
-    if check.code not in TRUSTED or check.level != "reject":
-        return check
-    return replace(check, remedy=f"{check.remedy}; if all is right as it is, pass {_TRUST}")
-
-
-def _examine(
-    opened: Opened, robot: RobotDescription | None, settings: Settings
-) -> tuple[Subject, list[Check | NotTested]]:
-    """Return what is judged of one log, and its checks, of the model too where none rejects it."""
-    log = opened.log
-    if robot is not None and robot.n_joints != log.n_joints:
-        words = f"log has {log.n_joints} joints, model {robot.n_joints}"
-        remedy = "give the description of this robot, or choose the columns with --joints"
-        return Subject(log), [Check.of("S02", "reject", words, where=opened.path, remedy=remedy)]
-    subject = Subject(log if robot is None else replace(log, robot_text=format_robot(robot)))
+def _examine(subject: Subject, opened: Opened, settings: Settings) -> list[Check | NotTested]:
+    """Return the checks of one log, and of the model where none of them rejects it."""
     found = [*findings(subject, TRUSTED if settings.trust_units else ())]
     if any(item.level == "reject" for item in found):
-        return subject, found
+        return found
     of_model: list[Check | NotTested] = []
     try:
         of_model += plausibility_findings(subject)
@@ -189,7 +180,7 @@ def _examine(
         # of two channels with the same samples it is not known that each fits best in its place
         shown = ("ok", "untested")
         of_model = [i for i in of_model if i.code != "RRID-S13" or i.level not in shown]
-    return subject, [*found, *of_model]
+    return [*found, *of_model]
 
 
 def _periods(subject: Subject, opened: Opened) -> list[Check]:
@@ -283,8 +274,11 @@ def exit_code(result: Result, check: bool) -> int:
 def report(result: Result) -> Report:
     """Return the verdict, the findings, what was checked, and the signals of the first logs."""
     found = sorted((c for c in result.checks if c.level != "ok"), key=first_to_read)
-    sections = [*boundary_card(result.boundary), _found_section(found), _logs_section(result)]
-    sections += [_passed_section(result), _not_tested_section(result)]
+    more = len(found) - REPORT.findings
+    text = (f"{more} more are in result.json.",) if more > 0 else ()
+    table = checks_table(found[: REPORT.findings], as_given=True)
+    sections = [*boundary_card(result.boundary), Section("Findings", text, (table,))]
+    sections += [_logs_section(result), _passed_section(result), _not_tested_section(result)]
     sections = [section for section in sections if any(table.rows for table in section.tables)]
     previews = list(result.previews)
     for log in result.logs:
@@ -327,35 +321,28 @@ def _verdict(result: Result, found: list[Check]) -> str:
     return f"{verdict}. First of all: {found[0].message}."
 
 
-def _found_section(found: list[Check]) -> Section:
-    more = len(found) - REPORT.findings
-    text = (f"{more} more are in result.json.",) if more > 0 else ()
-    return Section("Findings", text, (checks_table(found[: REPORT.findings], as_given=True),))
-
-
 def _passed_section(result: Result) -> Section:
-    groups: dict[str, list[Check]] = defaultdict(list)
+    first: dict[str, Check] = {}
+    counts = Counter(check.code for check in result.checks if check.level == "ok")
     for check in result.checks:
         if check.level == "ok":
-            groups[check.code].append(check)
-    rows = []
-    for code, group in sorted(groups.items()):
-        logs = len({check.where.split(",")[0] for check in group})
-        rows.append((group[0].message, logs, f"{code} {title_of(code)}".strip()))
+            first.setdefault(check.code, check)
+    rows = tuple(
+        (check.message, counts[code], f"{code} {title_of(code)}".strip())
+        for code, check in sorted(first.items())
+    )
     columns = ("what was measured, in the first of them", "logs", "code")
-    return Section("What was looked at and is in order", (), (Table(columns, tuple(rows)),))
+    return Section("What was looked at and is in order", (), (Table(columns, rows),))
 
 
 def _not_tested_section(result: Result) -> Section:
-    groups: dict[tuple[str, str], list[str]] = defaultdict(list)
-    for item in result.not_tested:
-        groups[item.code, item.reason].append(item.where)
-    rows = []
-    for (code, reason), places in sorted(groups.items()):
-        rows.append((reason, len(places), places[0], f"{code} {title_of(code)}".strip()))
-    table = Table(("why", "logs", "the first of them", "code"), tuple(rows))
+    counts = Counter((item.code, item.reason) for item in result.not_tested)
+    rows = tuple(
+        (reason, count, f"{code} {title_of(code)}".strip())
+        for (code, reason), count in sorted(counts.items())
+    )
     text = ("Neither passed nor failed: these logs give nothing to judge by.",)
-    return Section("Not tested, and why", text, (table,))
+    return Section("Not tested, and why", text, (Table(("why", "logs", "code"), rows),))
 
 
 def _logs_section(result: Result) -> Section:

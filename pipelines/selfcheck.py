@@ -115,7 +115,10 @@ def self_test() -> Iterator[Finding]:
         for name, work in (
             ("simulating a log", lambda: f"{log.n_samples} samples in closed loop"),
             ("HDF5 log, written and read", partial(_round_trip, Path(folder) / "a.h5", log)),
-            ("Parquet log, written and read", partial(_round_trip, Path(folder) / "a.parquet", log)),
+            (
+                "Parquet log, written and read",
+                partial(_round_trip, Path(folder) / "a.parquet", log),
+            ),
             ("base parameters", partial(_fitted, log)),
             ("observer", _observed),
             ("figure", _drawn),
