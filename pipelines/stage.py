@@ -122,7 +122,6 @@ class Stage(Generic[S, R]):
     # read within `run` as well, where settings name files
     beside: Callable[[S, Request], Beside] | None = None
     in_run: S | None = None  # settings within `run`, where they are others than by default
-    durations: Callable[[R], dict[str, float]] = lambda result: {}  # [s] of parts of compute
     remakes: Callable[[str], bool] = lambda name: False  # own files, made again if changed (P10)
     # called at the end; `finished`: not by a signal
     ended: Callable[[Inputs, bool], None] = lambda inputs, finished: None
@@ -188,35 +187,26 @@ def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     if stage.sessions == "one":
         inputs = of_one_session(inputs)
     try:
-        outcome = _outcome(stage, request, settings, inputs, described, started)
+        out = request.out or default_out(inputs, stage.name)
+        changed = usable_folder(out, stage, request, inputs, described)
+        answer = answered(stage, request, settings, inputs, described, started)
+        request.tell("writing the report")
+        object_ = answer.write(out)
     except BaseException as problem:
         stage.ended(inputs, isinstance(problem, Exception))
         raise
     stage.ended(inputs, True)
-    return outcome
+    words = "was not what rrrid had written there; it was made again"
+    remedy = "look after the disk, or keep your own changes in another folder"
+    remade = (Check.of("P10", "warn", words, where=name, remedy=remedy) for name in changed)
+    exit_code = stage.exit_code(answer.result, request.check)
+    checks = (*remade, *answer.checks)
+    return Outcome(answer.result, object_, answer.report, out, exit_code, checks, inputs)
 
 
 def robot_hashes(request: Request) -> dict[Path, str]:
     """Return the SHA-256 of the files that describe the robot which a request names."""
     return {} if request.robot is None else _hashes(robot_sources(request.robot), {})
-
-
-def _outcome(
-    stage: Stage[S, R],
-    request: Request,
-    settings: S,
-    inputs: Inputs,
-    described: dict[Path, str],
-    started: float,
-) -> Outcome[R]:
-    out = request.out or default_out(inputs, stage.name)
-    changed = usable_folder(out, stage, request, inputs, described)
-    answer = answered(stage, request, settings, inputs, described, started)
-    answer = dataclasses.replace(answer, checks=(*_remade(changed), *answer.checks))
-    request.tell("writing the report")
-    object_ = answer.write(out)
-    exit_code = stage.exit_code(answer.result, request.check)
-    return Outcome(answer.result, object_, answer.report, out, exit_code, answer.checks, inputs)
 
 
 def usable_folder(
@@ -266,7 +256,18 @@ class Answer(Generic[S, R]):
         bare, series = encode(result)
         object_: dict[str, Any] = tilde(headed(stage.name, bare))
         sources = {str(path): value for path, value in self.hashes.items()}
-        about = _about(stage, self.request, self.settings) | {"inputs": sources}
+        request, names = self.request, ("strict", "assume_units", "robot", "format")
+        options = {name: getattr(request, name) for name in names}
+        about = {
+            "tool": "rrrid",
+            "version": __version__,
+            "command": stage.name,
+            "settings": encode(self.settings)[0],
+            "seed": getattr(self.settings, "seed", None),
+            "options": options | {"joints": list(request.joints), "session": request.session},
+            "python": platform.python_version(),
+            "inputs": sources,
+        }
         with _new_folder(out) as folder:
             write_text(folder / "result.json", json_text(object_))
             if series:
@@ -277,8 +278,11 @@ class Answer(Generic[S, R]):
                 from pipelines.report.render import write_report
 
                 write_report(tilde(self.report), folder, footer_of(stage.name, sources))
-            _refuse_changed(self.hashes)
-            _write_provenance(folder, about, self.started, stage.durations(result))
+            for path, before in self.hashes.items():
+                if not path.exists() or hash_file(path) != before:
+                    words, remedy = "was modified while it was processed", "wait for the recording"
+                    raise InputRejected("F14", words, where=path, remedy=remedy)
+            _write_provenance(folder, about, self.started)
         return object_
 
 
@@ -348,14 +352,6 @@ def _new_folder(out: Path) -> Iterator[Path]:
         remove_folder(staging)
 
 
-def _remade(changed: Iterable[str]) -> Iterator[Check]:
-    """P10: files that are not as rrrid had written them."""
-    remedy = "look after the disk, or keep your own changes in another folder"
-    for name in changed:
-        words = "was not what rrrid had written there; it was made again"
-        yield Check.of("P10", "warn", words, where=name, remedy=remedy)
-
-
 def footer_of(command: str, inputs: Mapping[str, str]) -> dict[str, str]:
     """Return the foot of a report: versions, and inputs (path -> SHA-256).
 
@@ -381,35 +377,7 @@ def _hashes(sources: Iterable[Path], known: Mapping[Path, str]) -> dict[Path, st
     return hashes
 
 
-def _refuse_changed(hashes: dict[Path, str]) -> None:
-    """F14: refuse a result of inputs that have changed meanwhile."""
-    for path, before in hashes.items():
-        if not path.exists() or hash_file(path) != before:
-            words = "was modified while it was processed"
-            remedy = "wait until the recording is finished"
-            raise InputRejected("F14", words, where=path, remedy=remedy)
-
-
-def _about(stage: Stage[S, R], request: Request, settings: S) -> dict[str, Any]:
-    """Return the provenance that is known before anything is written."""
-    names = ("strict", "assume_units", "robot", "format")
-    options = {name: getattr(request, name) for name in names} | {"joints": list(request.joints)}
-    if request.session:
-        options["session"] = request.session
-    return {
-        "tool": "rrrid",
-        "version": __version__,
-        "command": stage.name,
-        "settings": encode(settings)[0] if dataclasses.is_dataclass(settings) else {},
-        "seed": getattr(settings, "seed", None),
-        "options": options,
-        "python": platform.python_version(),
-    }
-
-
-def _write_provenance(
-    folder: Path, about: dict[str, Any], started: float, durations: dict[str, float]
-) -> None:
+def _write_provenance(folder: Path, about: dict[str, Any], started: float) -> None:
     """Write provenance.json, with the hash of every file that is there."""
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     # of loaded libraries: others had no part in the outcome, and importlib.metadata costs 15 ms
@@ -421,6 +389,4 @@ def _write_provenance(
         "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(started)),
         "duration": time.time() - started,
     }
-    if durations:
-        about["durations"] = durations
     write_text(folder / PROVENANCE, json_text(tilde(about)))

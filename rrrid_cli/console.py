@@ -63,7 +63,7 @@ class Progress:
         if self.bar is not None:
             self.bar.reset(self.task, description=self.step)
         elif self.verbose:
-            self._print(self.step)
+            print(self.step, file=sys.stderr, flush=True)
 
     def __exit__(self, *_: object) -> None:
         self.over.set()
@@ -75,10 +75,8 @@ class Progress:
 
     def _repeat(self) -> None:
         while not self.over.wait(self.silence):
-            self._print(f"{self.step}, {time.monotonic() - self.begun:.0f} s")
-
-    def _print(self, words: str) -> None:
-        print(words, file=sys.stderr, flush=True)
+            seconds = time.monotonic() - self.begun
+            print(f"{self.step}, {seconds:.0f} s", file=sys.stderr, flush=True)
 
 
 def print_outcome(outcome: Outcome[Any], options: Common) -> None:
@@ -150,15 +148,16 @@ def print_table(
     names = list(head) or [""] * len(columns)
     each = zip(names, columns, strict=True)
     least = [max(map(len, (*cells, *name.split()))) for name, cells in each]
-    whole = [max(len(name), room) for name, room in zip(names, least, strict=True)]
-    rooms = whole if sum(whole) + 2 * len(whole) <= width else least  # long headings break
+    rooms = [max(len(name), room) for name, room in zip(names, least, strict=True)]
+    rooms = rooms if sum(rooms) + 2 * len(rooms) <= width else least  # long headings break
     for name, cells, room in zip(names, columns, rooms, strict=True):
         side: Any = "right" if head and are_numbers(cells) else "left"
         table.add_column(name, justify=side, vertical="bottom", width=room)
     for row in zip(*columns, strict=True):
         table.add_row(*row)
-    room = sum(rooms) + 2 * len(rooms)
-    lines = Console(file=io.StringIO(), width=room, markup=False, highlight=False)
+    lines = Console(
+        file=io.StringIO(), width=sum(rooms) + 2 * len(rooms), markup=False, highlight=False
+    )
     with lines.capture() as drawn:
         lines.print(table)
     for line in drawn.get().splitlines():
@@ -180,19 +179,11 @@ def print_checks(
         remedy = f" ({check.remedy})" if check.remedy else ""
         print(f"  {SIGNS[check.level]} {check.code} {place}{check.message}{remedy}", file=stream)
         if others:
-            print(f"      {_places([check, *others])}", file=stream)
+            places = dict.fromkeys(one.where.split(", ")[0] for one in (check, *others))
+            told = f", in {', '.join(places)}" if 1 < len(places) <= most else ""
+            print(f"      alike {len(others) + 1} times in all{told}", file=stream)
     if len(alike) > most:
         print(f"  … {len(alike) - most} more in the report", file=stream)
-
-
-def _places(group: Sequence[Check], most: int = 30) -> str:
-    """Return where a finding was made: "alike 5 times in all, in a.h5, b.h5; joints 1, 2"."""
-    logs = list(dict.fromkeys(check.where.split(", ")[0] for check in group if check.where))
-    joints = sorted({int(n) for check in group for n in re.findall(r", joint (\d+)", check.where)})
-    text = f"alike {len(group)} times in all"
-    text += f", in {', '.join(logs[:most])}" if logs else ""
-    text += f" and {len(logs) - most} more" if len(logs) > most else ""
-    return f"{text}; joints {', '.join(map(str, joints))}" if len(joints) > 1 else text
 
 
 def print_error(problem: RrridError, most: int = 12) -> None:

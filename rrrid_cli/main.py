@@ -3,32 +3,26 @@
 from __future__ import annotations
 
 import atexit
-import codecs
 import gc
-import json
 import os
 import re
 import signal
 import sys
-import unicodedata
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn, TextIO
 
 import typer
 
-from pipelines.errors import EnvironmentFault, Interrupted, RrridError, UsageError, did_you_mean
+from pipelines.errors import Interrupted, RrridError, UsageError, did_you_mean
 from pipelines.io.output import fault_of, renamed
 from rrrid_cli.app import build
 from rrrid_cli.console import print_error
 
 __all__ = ["call", "entry"]
 
-# What a character becomes where an encoding lacks it; any other its closest ASCII letters.
-PLAIN = '→:-> ·:- −:- ×:x ≤:<= ≥:>= ±:+- ∞:inf τ:tau Φ:Phi “:" ”:" ’:\''
 _SIGNALS = (signal.SIGTERM, signal.SIGINT)
 
 
@@ -129,21 +123,14 @@ def _as_error(problem: BaseException, words: Iterable[str]) -> RrridError:
         problem = fault_of(problem, Path("standard output"))
     if not isinstance(problem, RrridError):
         return _internal(problem)
-    try:
-        os.getcwd()
-    except FileNotFoundError:  # relative paths mean nothing
-        if not isinstance(problem, EnvironmentFault):
-            return problem
-        what, remedy = "the folder that the command was called in", "call it from another (cd)"
-        return EnvironmentFault("P02", f"{what} was deleted", "working folder", remedy)
     # absolute paths, as stages have them -> as the command line has them
     names: dict[str, str] = {}
-    for text in (part for word in words for part in (word, word.partition("=")[2])):
-        path = Path(text)
-        if text and not text.startswith("-") and not path.is_absolute():
-            for one in (path, *(above for above in path.parents if above != Path())):
-                names.setdefault(str(one.absolute()), str(one))
-                names.setdefault(os.path.abspath(one), str(one))
+    with suppress(FileNotFoundError):  # a working folder that is gone
+        for text in (part for word in words for part in (word, word.partition("=")[2])):
+            path = Path(text)
+            if text and not text.startswith("-") and not path.is_absolute():
+                for one in (path, *(above for above in path.parents if above != Path())):
+                    names.setdefault(os.path.abspath(one), str(one))
     for each in (problem, *problem.others):
         each.where, each.message = renamed(each.where, names), renamed(each.message, names)
         each.remedy = renamed(each.remedy, names)
@@ -214,34 +201,19 @@ def _raise_again(lost: Any) -> None:
 
 
 def _prepare_streams(as_json: bool) -> None:
-    """Open a closed standard stream on the null device, and let no character fail.
-
-    A character that the encoding lacks becomes an escape in JSON and elsewhere similar letters.
-    """
+    """Open a closed standard stream on the null device, and let no character fail."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
             null = os.open(os.devnull, os.O_RDWR)
             if null != number:  # a later file must not take the number
                 os.dup2(null, number)
-            mode = "r" if number == 0 else "w"
-            setattr(sys, name, open(number, mode, encoding="utf-8"))  # noqa: SIM115
-    for name, change in (("json", lambda text: json.dumps(text)[1:-1]), ("plain", _simplified)):
-        codecs.register_error(f"rrrid-{name}", partial(_replaced, change))
+            stream = open(number, "r" if number == 0 else "w", encoding="utf-8")  # noqa: SIM115
+            setattr(sys, name, stream)
     for stream in (sys.stdout, sys.stderr):
         if (configure := getattr(stream, "reconfigure", None)) is not None:
-            configure(errors="rrrid-json" if as_json and stream is sys.stdout else "rrrid-plain")
-
-
-def _replaced(change: Callable[[str], str], problem: Any) -> tuple[str, int]:
-    """Return others for the characters that an encoding lacks, and where they end."""
-    return change(problem.object[problem.start : problem.end]), problem.end
-
-
-def _simplified(text: str) -> str:
-    """Return similar characters that every encoding has."""
-    plain = dict(pair.split(":") for pair in PLAIN.split())
-    signs = unicodedata.normalize("NFKD", text)
-    return "".join(plain.get(sign, sign if sign.isascii() else "") for sign in signs)
+            configure(errors="replace")
+            if as_json and stream is sys.stdout:
+                configure(encoding="utf-8")
 
 
 if __name__ == "__main__":
