@@ -43,13 +43,6 @@ INPUTS |= {"simulate": ("replay", "session"), "export": ("replay", "session")}
 INPUTS |= {"design-excitation": ("prior_logs", "session")}
 INPUTS |= {"compare": ("a", "b"), "report": ("folder",), "schema": ("what",), "doctor": ("quick",)}
 REQUIRED = ("a", "b", "folder", "root")
-# Shared options without effect: they are accepted, and help is silent about them.
-IDLE: dict[str, tuple[str, ...]]
-IDLE = {"inspect": ("format",), "frf": ("format",), "diagnose": ("format",)}
-IDLE |= {"import": ("check",), "convert": ("check",), "simulate": ("check",)}
-IDLE |= {"export": ("check", "format")}
-IDLE |= {"demo": ("robot", "assume_units")}
-IDLE |= {"compare": ("robot", "assume_units", "format", "strict")}
 # Shared options of commands that do not take them all.
 SHARED = {"report": ("out", "force", "quiet", "debug"), "schema": (), "doctor": ("json", "debug")}
 _MOST_ERRORS = 12  # numerics: lines of a batch; its report lists all
@@ -143,7 +136,7 @@ def _function(name: str) -> Callable[..., None]:
         options += parameters(stage_of(name).settings)
     out = f"Folder for the output. [{OUT.get(name, 'runs/ROBOT/FOLDER/COMMAND')}]"
     shared = SHARED.get(name, _names_of(Common))
-    options += parameters(Common, shared, hidden=IDLE.get(name, ()), out=out)
+    options += parameters(Common, shared, out=out)
     called.__signature__ = Signature(options)  # type: ignore[attr-defined]
     called.__annotations__ = {one.name: one.annotation for one in options}
     return called

@@ -84,18 +84,13 @@ def stage_file(command: str) -> Path:
 
 
 def parameters(
-    kind: type[Any],
-    only: Iterable[str] | None = None,
-    required: Iterable[str] = (),
-    hidden: Iterable[str] = (),
-    **texts: str,
+    kind: type[Any], only: Iterable[str] | None = None, required: Iterable[str] = (), **texts: str
 ) -> list[Parameter]:
     """Return the typer parameters of a dataclass's options.
 
     Args:
         only: fields that are offered; None: all.
         required: fields that must be given.
-        hidden: fields about which help is silent.
         texts: field -> other help.
     """
     found, hints = [], typing.get_type_hints(kind)
@@ -114,8 +109,7 @@ def parameters(
             text += f" [{','.join(map(str, default)) if many else default}]"
         about: Any = typer.Argument(help=text, metavar=flag, show_default=False)
         if flag.startswith("-"):
-            silent = field.name in hidden
-            about = typer.Option(*_flags(field), help=text, metavar=metavar, hidden=silent)
+            about = typer.Option(*_flags(field), help=text, metavar=metavar)
         must = field.name in required
         shape: Any = taken if must else taken | None
         name, start = _key(kind, field), Parameter.empty if must else None

@@ -23,8 +23,7 @@ class SandboxConfig:
 class TextConfig:
     """Bounds of a TOML text: its parser may need time and memory far beyond the length."""
 
-    size: int = 4 << 20  # [B] a description with the URDF of a thousand links has 0.4 MB
-    bare: int = 1 << 20  # characters outside of texts and comments: 5,000 files of a recipe
+    size: int = 1 << 20  # [B] a description with the URDF of a thousand links has 0.4 MB
     parts: int = 6  # names in a dotted key; a configuration has two
 
 

@@ -42,15 +42,8 @@ Place = TypeVar("Place", bytearray, memoryview)
 _COUNT = 8  # numerics: [B] of the number that says how long a description is
 _AGAIN = "copy the file again"
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
-# An unterminated string reaches to the end of its line or of the text: one pass is enough.
-_STRING_OR_COMMENT = re.compile(
-    r'"""(?:[^"\\]++|\\.|"(?!""))*+(?:"""|\Z)'
-    r"|'''(?:[^']++|'(?!''))*+(?:'''|\Z)"
-    r'|"(?:[^"\\\n]++|\\[^\n])*+"?'
-    r"|'[^'\n]*+'?"
-    r"|\#[^\n]*+",
-    re.DOTALL,
-)
+# a key of many parts, whose parsing takes time by the square of their number
+_LONG_KEY = re.compile(rf"(?m)^[ \t\[]*(?:[\w\"'-]+[ \t]*\.[ \t]*){{{TEXT.parts},}}")
 
 
 @dataclass(frozen=True)
@@ -119,12 +112,9 @@ def parse_toml(text: str) -> dict[str, Any]:
     Raises:
         TomlError: it is not TOML, or longer, wider or deeper than the bounds.
     """
-    bare = _STRING_OR_COMMENT.sub(
-        lambda found: "" if found[0].startswith("#") else '""', text.replace("\r\n", "\n")
-    )
-    if len(text) > TEXT.size or len(bare) > TEXT.bare:
-        raise TomlError(f"more than {TEXT.size} characters, or {TEXT.bare} outside of texts")
-    if any(piece.count(".") >= TEXT.parts for piece in re.split(r"[=\n,{}\[\]]", bare)):
+    if len(text) > TEXT.size:
+        raise TomlError(f"more than {TEXT.size} characters")
+    if _LONG_KEY.search(text):
         raise TomlError(f"more than {TEXT.parts} parts of a key")
     try:
         return tomllib.loads(text)
@@ -222,9 +212,8 @@ def _replied(
     import numpy as np
 
     problem: RrridError
-    lowered = False
     try:
-        lowered = _limit(seconds, memory)
+        _limit(seconds, memory)
         answer = work()
         arrays = {k: np.ascontiguousarray(x, np.float64) for k, x in answer.arrays.items()}
         shapes = {name: values.shape for name, values in arrays.items()}
@@ -236,32 +225,24 @@ def _replied(
         problem = fault_of(fault, Path())
         problem.where = ""
     except MemoryError:
-        split = "split the recording"
-        problem = InputRejected("X05", "needs more memory than a log may", remedy=split)
-        if lowered:
-            words = "memory: reading it needs more than this process may use"
-            problem = EnvironmentFault("P03", words, remedy=split)
+        words, remedy = "needs more memory than it may", "split the recording, or raise --memory"
+        problem = InputRejected("X05", words, remedy=remedy)
     except BaseException as fault:
         return {"internal": f"{type(fault).__name__}: {fault}"}, []
     return {"error": {"exit": problem.exit_code, **problem.as_dict()}}, []
 
 
-def _limit(seconds: float, memory: int) -> bool:
-    """Limit time and memory of this process; True where it had less memory before."""
+def _limit(seconds: float, memory: int) -> None:
+    """Limit time and memory of this process, never above what it has."""
     import resource
 
-    lowered = False
+    wanted = {resource.RLIMIT_CORE: 0, resource.RLIMIT_CPU: math.ceil(seconds) + 1}
     if sys.platform == "linux":
         pages = int(Path("/proc/self/statm").read_text().split()[0])
-        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-        wanted = pages * resource.getpagesize() + memory
-        lowered = hard != resource.RLIM_INFINITY and hard < wanted
-        resource.setrlimit(resource.RLIMIT_AS, (hard if lowered else wanted, hard))
-    hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
-    if hard == resource.RLIM_INFINITY:  # an endless loop ends, also where the parent is gone
-        resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds) + 1, hard))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    return lowered
+        wanted[resource.RLIMIT_AS] = pages * resource.getpagesize() + memory
+    for kind, value in wanted.items():
+        hard = resource.getrlimit(kind)[1]
+        resource.setrlimit(kind, (value if hard < 0 else min(value, hard), hard))
 
 
 def _received(reader: int, path: Path, longest: int, memory: int, seconds: float) -> Answer:
