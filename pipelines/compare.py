@@ -21,14 +21,8 @@ from pipelines.dynamics.parameter_names import named_in, quantity_of
 from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.estimation.bootstrap import limit_of, standardised
 from pipelines.io.option import option
-from pipelines.io.results import read_any_result
-from pipelines.report.compared_results import (
-    called,
-    label_of,
-    less_findings,
-    modelled,
-    of_other_commands,
-)
+from pipelines.io.results import read_result
+from pipelines.report.compared_results import called, less_findings, modelled
 from pipelines.report.comparison_report import (
     Answer,
     Comparison,
@@ -60,22 +54,22 @@ def read(request: Request, settings: Settings) -> Inputs:
         UsageError: C02, not two of them, or of different commands; C04, no such file.
         InputRejected: F02, F05, S19, what is no result as rrrid wrote it.
     """
-    results = [read_any_result(path) for path in request.paths]
-    try:
-        a, b = (
-            results * 2 if len(results) == 1 else results
-        )  # a path given twice is in `paths` once
-    except ValueError:
+    results = [read_result(path) for path in request.paths]
+    results = results * 2 if len(results) == 1 else results  # a path given twice is there once
+    if len(results) != 2:  # noqa: PLR2004
         remedy = "name two: rrrid compare A B"
-        raise UsageError("C02", f"{len(results)} results", where="compare", remedy=remedy) from None
+        raise UsageError("C02", f"{len(results)} results", where="compare", remedy=remedy)
+    a, b = results
     if a.command != b.command:
-        raise of_other_commands(a, b)
+        words = f"results of different commands: {a.command} and {b.command}"
+        remedy = "compare two of one command, or the model.json that both have left"
+        raise UsageError("C02", words, where="compare", remedy=remedy)
     robots = {robot for one in (a, b) if (robot := robot_of(one.object))}
     known = {0: "unknown", 1: next(iter(robots), "")}
     return Inputs(
         sources=tuple(dict.fromkeys((a.path, b.path))),
         material=(a, b),
-        label=label_of(a, b),
+        label="-and-".join(name.replace("/", "-") for name in dict.fromkeys(called(a, b))),
         robot_name=known.get(len(robots), "several"),
     )
 

@@ -292,23 +292,22 @@ def select_joints(
     chosen = np.array(joints) - 1
     samples = log.t.size if "t" in log else -1
 
-    def rows(values: Array | None) -> Array | None:
+    def taken(values: Array | None) -> Array | None:
+        """Take the joints of (samples, joints), of the same turned round (S11), or of (joints,)."""
+        if values is not None and values.shape == (samples, columns):
+            return np.ascontiguousarray(values[:, chosen])
         return values[chosen] if values is not None and len(values) == columns else values
 
-    signals = {}
-    for name, signal in log.signals.items():
-        values = signal.values
-        if values.shape == (samples, columns):
-            values = np.ascontiguousarray(values[:, chosen])
-        elif values.shape == (columns, samples):  # turned round (S11)
-            values = values[chosen]
-        signals[name] = replace(signal, values=values)
+    signals = {
+        name: signal if name == "t" else replace(signal, values=taken(signal.values))
+        for name, signal in log.signals.items()
+    }
     controller = log.controller
     if controller is not None:
-        changes: dict[str, Any] = {key: rows(getattr(controller, key)) for key in PER_JOINT}
+        changes: dict[str, Any] = {key: taken(getattr(controller, key)) for key in PER_JOINT}
         controller = replace(controller, **changes)
     joint = None if log.joint is None else joints.index(log.joint) + 1
-    posture = rows(log.posture)
+    posture = taken(log.posture)
     return replace(log, signals=signals, joint=joint, posture=posture, controller=controller)
 
 

@@ -144,12 +144,6 @@ class StoredResult:
     path: Path
     command: str
     object: dict[str, Any]
-    within: str = ""  # the folder of a stage, below that of the run whose result.json has it
-
-    @property
-    def folder(self) -> Path:
-        """Return the folder where the command has left it."""
-        return self.path.parent / self.within
 
     @property
     def series(self) -> Path:
@@ -194,28 +188,6 @@ def _whole_number(digits: str) -> int:
     if len(digits) > LIMITS.digits:
         raise ValueError
     return int(digits)
-
-
-def read_any_result(path: Path) -> StoredResult:
-    """Return the result in `path`, as `read_result`, or of a stage within the result of a run.
-
-    The folder of a stage need not be there: one that writes no files has none.
-
-    Raises:
-        UsageError: C04, there is none, or the run has passed the stage over.
-        InputRejected: as `read_result`.
-    """
-    run = None
-    if not path.is_file() and not (path / "result.json").is_file():
-        run = stored_result(path.parent, "run")
-    for stage in (run or {}).get("stages") or ():
-        if stage["name"] == path.name:
-            if stage["result"] is None:
-                words = f"the run has no result of {path.name}: it was passed over, or refused"
-                raise UsageError("C04", words, path, "its report says why")
-            found = {"command": path.name, **stage["result"]}
-            return StoredResult(path.parent / "result.json", path.name, found, path.name)
-    return read_result(path)
 
 
 def stored_result(path: Path, command: str) -> dict[str, Any] | None:

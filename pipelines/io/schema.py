@@ -370,17 +370,16 @@ def log_schema() -> dict[str, Any]:
         "robot": text | {"description": "the robot description, TOML"},
     }
     whole["required"] += ["format", "format_version", "robot"]
-    units = text | {"description": "unit of the samples"}
-    long_name = text | {"description": "what it is, in words"}
-    signals: dict[str, Any] = {}
-    for name, (quantity, words) in (SIGNALS | DERIVED).items():
-        signals[name] = {
+    signals = {
+        name: {
             "type": "object",
             "description": f"{words}; SI: {_REVOLUTE.get(quantity, 'N m or rad/s^2')}",
-            "properties": {"units": units, "long_name": long_name},
+            "properties": {"units": text, "long_name": text},
             "required": ["units", "long_name"],
             "additionalProperties": False,
         }
-    signals = {"type": "object", "additionalProperties": False, "properties": signals}
+        for name, (quantity, words) in (SIGNALS | DERIVED).items()
+    }
+    described = {"type": "object", "additionalProperties": False, "properties": signals}
     title = f"{FORMAT}, version {FORMAT_VERSION}"
-    return {"$schema": DRAFT, **whole, "title": title, "$defs": {"signals": signals}}
+    return {"$schema": DRAFT, **whole, "title": title, "$defs": {"signals": described}}
