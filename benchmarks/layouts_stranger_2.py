@@ -137,7 +137,7 @@ def slow_fieldbus(folder: Path, run: Run) -> Answer:
     more = {"date": stamps(run, "%d.%m.%Y"), "time": stamps(run, "%H:%M:%S")}
     more |= {"ms": (values(run)["ms"] + 250) % 1000}
     return recorded(
-        folder, run, "plc.csv", {}, specs, known=False, data=more, sep=";", float_format="%.4f"
+        folder, run, "plc.csv", {"Time+ms": "s+ms"}, specs, data=more, sep=";", float_format="%.4f"
     )
 
 

@@ -25,8 +25,8 @@ from pipelines.excitation.other_plans import frf_plans, friction_plans, hold_pla
 from pipelines.excitation.result import Result, doubts, first_mode, information_of, judged, planned
 from pipelines.excitation.result import log_of as planned_log_of
 from pipelines.excitation.task import Wishes, plan_task
+from pipelines.importers.controller import controller_table, write_controller_table
 from pipelines.importers.recipe import Recipe
-from pipelines.importers.units import controller_table, write_controller_table
 from pipelines.io.files import write_log
 from pipelines.io.model_file import read_model
 from pipelines.io.option import option

@@ -22,8 +22,8 @@ from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
 from pipelines.estimation.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.estimation.result import torques
 from pipelines.friction.in_folder import fitted_in_folder
+from pipelines.importers.controller import controller_table, write_controller_table
 from pipelines.importers.recipe import Recipe
-from pipelines.importers.units import controller_table, write_controller_table
 from pipelines.io.files import write_log
 from pipelines.io.log import ExperimentLog, derive, digest_of, recording
 from pipelines.io.model_file import ModelFile, read_model

@@ -185,7 +185,7 @@ def test_s07_radians_that_are_degrees(folder: Path) -> None:
     joint = '[[robot.joint]]\nname = "j"\ntype = "revolute"\na = 0.0\nalpha = 0.0\nd = 0.0\noffset = 0.0\nposition = [-2.0, 2.0]\n'
     recipe = RECIPE.replace('use = "rrr"',
                             'name = "r"\ngravity = [0.0, 0.0, -9.81]\n[robot.kinematics]\nconvention = "dh"\n' + 3 * joint)
-    with pytest.raises(InputRejected, match=r"RRID-S07.*column 'q_1'.*looks like degrees or the motor side.*--trust-units"):
+    with pytest.raises(InputRejected, match=r"RRID-S07 run.csv, signal q, joint 1.*looks like degrees or the motor side.*--trust-units"):
         run(folder, recipe)
     assert run(folder, recipe, trust_units=True).result.logs
     assert run(folder, recipe.replace('"rad"', '"deg"')).result.logs

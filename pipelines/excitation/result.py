@@ -21,7 +21,7 @@ from pipelines.excitation.other_plans import Plan
 from pipelines.excitation.regressor import ArmColumns, grams_of
 from pipelines.excitation.task import LOWER_BOUND, Task
 from pipelines.excitation.verify import Peak
-from pipelines.importers.units import ControllerTable
+from pipelines.importers.controller import ControllerTable
 from pipelines.io.log import ExperimentLog, Signal
 from pipelines.io.results import NOT_STORED
 from pipelines.writing.task import planned_log

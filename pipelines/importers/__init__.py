@@ -1,9 +1,9 @@
 """Import recordings of other programs as logs.
 
-Reading   tables (documents too) <- text (header), matlab, npy -> raw: named columns
+Reading   tables (READERS: one reader a format) <- text, matlab, npy; raw: named columns
 Recipe    recipe: the keys and their checks; patterns: names of files
 Import    assemble -> repair -> units -> make_log; clock
-Draft     guess <- hypotheses (units) <- signals (columns) <- columns <- names (vocabulary.toml);
-          evidence, links and notes: what numbers, a robot's links and lines of the file show
+Draft     guess <- roles (columns) <- names; links: the torque of the robot's own links
+Plans     controller: a planned motion in a recipe's columns
 Numbers   config
 """

@@ -1,8 +1,9 @@
-"""Draft a recipe for a recording, with the evidence for every guess, for a person to correct.
+"""Draft a recipe for a recording, with the reason of every guess, for a person to correct.
 
-The draft says what each value rests on: a name, a limit of the robot in the folder, the agreement
-of a velocity with the slope of a position, jumps of one size, the sign of the power. What neither
-names nor numbers decide is marked FILL IN, with the candidates; what is likely is marked "check:".
+Names give the columns (`roles`), headers and names the units. Where they do not, two relations of
+the numbers decide: a velocity is the slope of its position, and a torque follows from the motion by
+weight and inertia of the robot's own links (`links`). The same relations refute a name. What
+neither decides is marked FILL IN, with the candidates; what is likely is marked "check:".
 """
 
 from __future__ import annotations
@@ -11,50 +12,29 @@ import json
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from pipelines.errors import clean
-from pipelines.importers.clock import median_step, round_rate
-from pipelines.importers.columns import Group, own_units
-from pipelines.importers.config import CHOICE, EVIDENCE, NOTES
-from pipelines.importers.evidence import Guess, held
-from pipelines.importers.hypotheses import NAMED, Findings, Model, infer, named_units, statement
-from pipelines.importers.notes import stated_gear, stated_of_some_joints
+from pipelines.errors import InputRejected, RrridError, clean
+from pipelines.importers.config import CLOCK, GUESS
+from pipelines.importers.links import LinkFit, TorqueModel, fit_links
+from pipelines.importers.names import COMMANDED, words_of
 from pipelines.importers.raw import RawTable
 from pipelines.importers.recipe import BLANK, blanks_of
-from pipelines.importers.signals import Choice, read_recording
+from pipelines.importers.roles import Clock, Group, Roles, choose, matrix
+from pipelines.importers.tables import read_table
+from pipelines.io.limits import FEWEST, LARGEST_JITTER, jitter
+from pipelines.io.log import Array
+from pipelines.io.robot import RobotDescription
+from pipelines.io.robot_files import load_robot
 from pipelines.io.sandbox import parse_toml
-from pipelines.io.units import UNITS
+from pipelines.io.units import UNITS, canonical_unit
 
-_ONE_JOINT = f"""[robot]                                 # check: one joint, about the z axis
-name = "one-joint"
-# gravity: [0.0, 0.0, -9.81] on a vertical axis, where it does no work; \
-[0.0, -9.81, 0.0] on a horizontal one
-gravity = "{BLANK}"
-
-[robot.kinematics]
-convention = "dh"
-
-[[robot.joint]]
-name = "joint"
-type = "revolute"
-a = 0.0
-alpha = 0.0
-d = 0.0
-offset = 0.0
-"""
-# Parts of an arm.
-_BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")
-_SPEEDS = ("rad/s", "deg/s", "rev/s", "rpm", "mrad/s", "mdeg/s")
-_TORQUE_CONSTANT = re.compile(r"torque[ _-]?const|\bk_?t\b|N ?m/A", re.IGNORECASE)
-_MOTORS = "q_motor = N q_joint, tau_joint = N^T tau_motor"
-_FILE_OF_AXIS = re.compile(
-    r"(.*(?:joint|axis|axe|achse|motor|mot|id|actuator|servo|drive|node|j|m|a)[ _-]?)(\d+)(\D*)",
-    re.IGNORECASE,
-)
+_ANGLES = {unit: UNITS[unit].factor for unit in ("rad", "deg", "rev", "mrad")}
+_SPEEDS = {unit: UNITS[unit].factor for unit in ("rad/s", "deg/s", "rev/s", "rpm", "mrad/s")}
+_TIMES = {unit: UNITS[unit].factor for unit in ("s", "ms", "us", "ns")}
 
 
 @dataclass(frozen=True)
@@ -72,345 +52,375 @@ class Draft:
         return tuple(x for x in whole if x.removesuffix(".unit") not in set(whole) - {x})
 
 
-def guess_recipe(path: Path, robot: str | None = None, model: Model | None = None) -> Draft:
-    """Return a commented recipe for the recording in `path` and its companion file.
+@dataclass(frozen=True)
+class Guess:
+    """A value, "" where it is open, and why."""
+
+    value: str
+    why: str
+    sure: bool = False
+
+    @property
+    def comment(self) -> str:
+        return f"# {'' if self.sure else 'check: '}{clean(self.why, 300)}"
+
+
+def guess_recipe(path: Path, robot: str | None = None, model_of: object = None) -> Draft:
+    """Return a commented recipe for the recording in `path`.
 
     Args:
         robot: description to use instead of that in the folder of the recording.
-        model: the torque of a robot's links by its description.
+        model_of: gives the torque of a robot's links by its description, None where they are not
+            known.
 
     Raises:
         InputRejected: the file cannot be read as a table of numbers.
     """
-    return _Drafting(infer(read_recording(path, robot), model)).draft()
+    table = _sound(read_table(path), path)
+    files, arm, problem = _robot_beside(path.parent, robot)
+    joints = [joint.name for joint in arm.joints] if arm else []
+    roles = choose(table, joints, bool(COMMANDED & set(words_of(path.stem))))
+    model = model_of(arm) if callable(model_of) and arm is not None else None
+    units = _Units(table, roles, arm, model)
+    evidence = {"time unit": units.time, "q unit": units.q, "tau unit": units.tau}
+    name, columns = clean(path.name, 80), ", ".join(clean(c, 40) for c in table.columns)
+    size = f"{table.rows.size} samples, columns {columns}"
+    lines = [
+        f"# Drafted by `rrrid import --guess {name}`: {size}.",
+        *(f"# {clean(c.message, 200)}." for c in table.checks if c.level != "ok"),
+        *(f"# the file says: {clean(note, 200)}" for note in table.notes[: GUESS.quoted]),
+        f'# Go through every "check:" and fill in what says {BLANK}; then: '
+        "rrrid import RECIPE.toml --source FOLDER",
+        *("", "[robot]", *_robot_lines(files, problem, robot is not None, len(joints))),
+        *("", "[log]", f"match = {quoted(path.name)}      "
+          '# a pattern such as "run_{number}.csv" takes many files'),
+        'experiment = "free"                     '
+        "# check: friction | excitation | writing | frf | hold | free",
+        'role = "identify"                       # check: identify | validate | reference',
+        _torque_kind(roles.chosen.get("tau")),
+        *("", "[time]", *_time_lines(roles.clock, units.time)),
+        *("", "[signals]", *_signal_lines(table, roles, units)),
+        *([] if "tau" in roles.chosen else _files_beside(path)),
+        *("", *_drive_lines(roles), "", *_resample_lines(units.t)),
+    ]  # fmt: skip
+    said = tuple(f"{what}: {guess.value or 'open'} ({'sure' if guess.sure else 'likely'}: "
+                 f"{guess.why})" for what, guess in evidence.items())  # fmt: skip
+    return Draft("\n".join(lines) + "\n", said)
 
 
-class _Drafting:
-    """The lines of a draft. Not frozen: it collects evidence on the way."""
+def _sound(table: RawTable, path: Path) -> RawTable:
+    """Return the rows without a hole, of the columns that mostly hold numbers.
 
-    def __init__(self, found: Findings) -> None:
-        self.found, self.reading = found, found.reading
-        self.evidence: list[str] = []
-
-    def note(self, what: str, guess: Guess) -> str:
-        """Return the comment behind a guessed value: confidence, evidence, and what to check."""
-        why = clean(guess.why, 300)
-        self.evidence.append(f"{what}: {guess.value or 'open'} ({guess.confidence}: {why})")
-        return f"# {'check: ' if guess.confidence != 'sure' else ''}{guess.confidence}, {why}"
-
-    def draft(self) -> Draft:
-        table, name = self.reading.table, clean(self.reading.path.name, 80)
-        columns = ", ".join(clean(c, 40) for c in table.columns)
-        size = f"{table.rows.size} samples, columns {columns}"
-        said = stated_of_some_joints(table.notes, self.reading.joints)[: NOTES.most_sentences]
-        lines = [
-            f"# Drafted by `rrrid import --guess {name}`: {size}.",
-            *(f"# {clean(c.message, 200)}." for c in table.checks if c.level != "ok"),
-            f'# Go through every "check:" and fill in what says {BLANK}; then: '
-            "rrrid import RECIPE.toml --source FOLDER",
-            *("", *self._robot(), "", "[log]"),
-            f"match = {_quoted(self.reading.path.name)}      "
-            '# a pattern such as "run_{number}.csv" takes many files',
-            'experiment = "free"                     '
-            "# check: friction | excitation | writing | frf | hold | free",
-            'role = "identify"                       # check: identify | validate | reference',
-            *(self._held(), "", "[time]", *self._time(), "", *self._map_hint(), "[signals]"),
-            *(f"# check: the file says '{clean(x, 200)}': do the numbers need it?" for x in said),
-            *(*self._position(), *self._velocity(), *self._torque()),
-            *("", *self._drive(), "", *self._missing(), *self._resample()),
-        ]
-        return Draft("\n".join(lines) + "\n", tuple(self.evidence))
-
-    def _robot(self) -> list[str]:
-        arm, n = self.reading.arm, self.reading.joints
-        if len(arm.files) == 1:
-            why = "as --robot says" if arm.named else "check: likely, it lies in the same folder"
-            lines = ["[robot]", f"use = {_quoted(arm.files[0])}   # {why}"]
-            lines += [f"# {clean(arm.problem, 300)}"] if arm.problem else []
-            return [*lines, *([f'tip_link = "{BLANK}"'] if "tip_link" in arm.problem else [])]
-        known, files = self.reading.q.group or self.reading.tau.group, self._files_of_axes()
-        if not arm.files and known and n == 1 and not files:
-            return _ONE_JOINT.rstrip().split("\n")
-        which = "robot.toml, a URDF, or a shipped name"
-        if arm.files:
-            which = f"one of {', '.join(clean(file, 40) for file in arm.files)}"
-        joints = f" of {n} joints" if known and n > 1 else ""
-        return ["[robot]", f'use = "{BLANK}"   # the robot{joints}: {which}', *files]
-
-    def _files_of_axes(self) -> list[str]:
-        """Return a comment with the files of this name but another number: one file a joint."""
-        path, named = self.reading.path, _FILE_OF_AXIS.fullmatch(self.reading.path.stem)
-        files = sorted(path.parent.glob(f"*{path.suffix}"))[: CHOICE.most_files]
-        if named is not None:
-            pattern = re.compile(rf"{re.escape(named[1])}\d+{re.escape(named[3])}")
-            files = [file for file in files if file != path and pattern.fullmatch(file.stem)]
-        listed = ", ".join(clean(file.name, 40) for file in files[:8]) if named else ""
-        line = (
-            f"    # one file a joint? beside this one are {listed}: join them, one column a joint"
-        )
-        return [line] if listed else []
-
-    def _held(self) -> str:
-        """Return `torque = …`: by the name of its columns, else by whether it is held."""
-        group, tau, q = self.reading.tau.group, self.found.tau, self.found.q
-        column = f"column '{clean(group.columns[0], 40)}'" if group else ""
-        if group is None or tau is None:
-            why = 'the torque is open; "held-command" where the drive was commanded'
-            guess = Guess("measured", "unsure", why)
-        elif group.origin == "commanded":
-            guess = Guess("held-command", "likely", f"{column} is named a command")
-        elif self.found.current:
-            guess = Guess("measured", "likely", "a current is sampled like the position")
-        elif group.origin == "measured":
-            guess = Guess("measured", "sure", f"{column} is named a measurement")
-        else:
-            guess = held(tau, q if q is not None else tau)
-        return f'torque = "{guess.value}"   {self.note("torque", guess)}'
-
-    def _time(self) -> list[str]:
-        """Return [time]: a column, or the rate that the file states or a velocity shows."""
-        clock, found = self.reading.clock, self.found
-        known, rate = math.isfinite(found.rate), f'rate = "{BLANK}"   # Hz'
-        if known:
-            rate = f"rate = {found.rate:g}   {self.note('rate', found.rate_guess)}"
-        if clock is None:
-            why = found.rate_guess.why or "no column rises steadily, so only you know it"
-            return [rate if known else f"{rate}; {clean(why, 200)}"]
-        note = self.note("time unit", found.clock)
-        if clock.paired:
-            columns, units = (", ".join(map(_quoted, x)) for x in (clock.columns, clock.units))
-            return [f"column = [{columns}]", f"unit = [{units}]   {note}"]
-        unit = found.clock.value or BLANK
-        lines = [f"column = {_quoted(clock.columns[0])}", f'unit = "{unit}"   {note}']
-        return [*lines, rate] if unit == "sample" else lines
-
-    def _map_hint(self) -> list[str]:
-        """Return a hint where positions rise in even steps without a clock: no motion, a map."""
-        group, q = self.reading.q.group, self.found.q
-        clocked = self.reading.clock is not None or math.isfinite(self.found.rate)
-        if clocked or group is None or q is None or q.shape[1] != 1:
-            return []
-        steps = np.diff(q[:, 0])
-        rising = steps.size >= EVIDENCE.map_least and ((steps > 0).all() or (steps < 0).all())
-        if not rising or np.std(steps) > EVIDENCE.map_even * abs(np.mean(steps)):
-            return []
-        name, file = clean(group.columns[0], 40), _quoted(self.reading.path.name)
-        return [
-            f"# check: likely a map and no log, {name} goes on in even steps of "
-            f"{np.mean(steps):.4g}; then delete [log], [time] and [signals], and write",
-            f"#     [[table]] match = {file}, columns = {{ q = {{ column = …, unit = … }} }}",
-        ]
-
-    def _position(self) -> list[str]:
-        choice, table, q = self.reading.q, self.reading.table, self.found.q
-        why_not = _doubt(self.found, "q")
-        if choice.group is None or q is None or why_not is not None:
-            return self._open("q", choice, why_not)
-        columns, units = _columns(choice.group.columns, table), _units(self.found.q_units)
-        lines = [f"q = {{ {columns}, unit = {units}{self.found.q_keys} }}"]
-        lines += [f"    {self.note('q unit', guess)}" for guess in self.found.q_guesses]
-        return [*lines, *self._about(choice, table)]
-
-    def _about(self, choice: Choice, table: RawTable) -> list[str]:
-        """Return comments: a stated unit, the order of the joints, the other candidates."""
-        group, lines = choice.group, []
-        if group is None:
-            return []
-        said = statement(self.found, group, False, table)
-        if said is not None and None in own_units(group.columns, table):
-            contrary = "" if said.value else "contradictory, "
-            lines.append(f"    # check: {contrary}the file states {clean(said.words, 200)}")
-        if gripper := ", ".join(clean(column, 40) for column in group.gripper):
-            lines.append(f"    # left out, a gripper's by the file's names: {gripper}")
-        if group.order == "file" and len(group.columns) > 1:
-            lines.append("    # check: joints in the order of the file, from the base to the tip")
-        for other in [other for other in choice.others[:6] if not other.partial]:
-            words = f"{other.words} ({other.quantity}, {other.origin})"
-            lines.append(f"    # also there: {words}, {_columns(other.columns, table)}")
-        return lines
-
-    def _velocity(self) -> list[str]:
-        """Return the line of a velocity that is the slope of the position; else a comment."""
-        group, table, found = self.reading.dq.group, self.reading.table, self.found
-        position, slope = self.reading.q.group, found.slope
-        if group is None:
-            return []
-        unit, columns = "", _columns(group.columns, table)
-        if slope is not None and found.t is not None and position is not None:
-            ordered = not _out_of_order(found, group) and position.order == group.order
-            turning = all(joint.type == "revolute" for joint in found.joints)
-            if turning and ordered and _doubt(found, "q") is None:
-                of_q = UNITS.get(found.q_units[0])
-                size = of_q.factor * slope.factor if of_q else math.nan
-                named = named_units(found, group, table)[0]
-                off = {speed: abs(size / UNITS[speed].factor - 1.0) for speed in _SPEEDS}
-                near = (speed for speed in _SPEEDS if off[speed] <= EVIDENCE.same_ratio)
-                fits = (u for u in near if not named or UNITS.get(named) == UNITS[u])
-                unit = next(fits, "")
-        if not unit or slope is None:
-            return [f"    # left out: {group.words} (velocity), {columns}"]
-        why = f"the position's slope is {slope.factor:.4g} times it"
-        guess = Guess(unit, "likely", f"{why}; remove the line where it was not measured")
-        line = f"dq = {{ {columns}, unit = {_quoted(unit)} }}"
-        return [line, f"    {self.note('dq unit', guess)}"]
-
-    def _torque(self) -> list[str]:
-        choice, table, found = self.reading.tau, self.reading.torque_table, self.found
-        why_not, sign = _doubt(found, "tau"), found.sign
-        if choice.group is None or found.tau is None or why_not is not None:
-            return self._open("tau", choice, why_not)
-        further = self._file(table)
-        if found.tau_scale:
-            further += f", scale = {found.tau_scale.number:g}"
-        if sign.value != "as recorded":
-            further += f', sign = "{BLANK}"' if "?" in sign.value else f", sign = {sign.value}"
-        columns = _columns(choice.group.columns, table)
-        lines = [f"tau = {{ {columns}, unit = {_units(found.tau_units)}{further} }}"]
-        lines += [f"    {self.note('tau unit', found.tau_guess)}", *self._about(choice, table)]
-        return [*lines, *([f"    {self.note('sign', sign)}"] if sign.why else [])]
-
-    def _open(self, signal: str, choice: Choice, doubt: str | None) -> list[str]:
-        """Return a blank line with the candidates, and why none of them was taken."""
-        table = self.reading.torque_table if signal == "tau" else self.reading.table
-        lines = [f'{signal} = {{ columns = "{BLANK}", unit = "{BLANK}" }}']
-        found = choice.opened.others
-        if not found:
-            items = list(table.text.items())[:5]
-            other = ", ".join(f"{clean(name, 40)} ({clean(text, 80)})" for name, text in items)
-            lines[0] += "   # no column looks like it"
-            lines[0] += ", and a log needs a torque" if signal == "tau" else ""
-            lines += [f"    # no columns of numbers: {other}"] if other else []
-        lines += [f"    # {doubt}"] if doubt else []
-        if found and all(group.origin == "commanded" for group in found):
-            lines.append("    # named commands, or the points of a plan: what was measured?")
-        for group in found[:8]:
-            first = group is choice.group and not doubt
-            ask = "write them from the base to the tip" if first else "candidate"
-            lines.append(f"    # {ask}: {_columns(group.columns, table)}{self._file(table)}")
-        if found and (beside := [f"file = {_quoted(name)}" for name in self.reading.beside[:8]]):
-            return [*lines, f"    # as many columns and rows: {', '.join(beside)}"]
-        return [*lines, *(self._other_files() if signal == "tau" else ())]
-
-    def _file(self, table: RawTable) -> str:
-        return f", file = {_quoted(table.source)}" if table is not self.reading.table else ""
-
-    def _other_files(self) -> list[str]:
-        """Return a comment with files of this folder whose names differ in more than numbers."""
-        path = self.reading.path
-        near = [p for p in sorted(path.parent.iterdir())[: CHOICE.most_files] if p.is_file()]
-        names = [p.name for p in near if p.suffix == path.suffix and p.name[0] != "."]
-        alike = re.sub(r"\d+", "#", path.name)
-        others = [_quoted(name) for name in names if re.sub(r"\d+", "#", name) != alike]
-        files = " or ".join(others[:4])
-        return [f"    # if the torques are in another file: file = {files}"] if others else []
-
-    def _drive(self) -> list[str]:
-        """Return [drive]: a blank where positions are the motors', else a comment.
-
-        Stated gear ratios and torque constants are quoted for a person to confirm.
-        """
-        notes, n, current = self.reading.table.notes, self.reading.joints, self.found.current
-        gear, of_motors = stated_gear(notes), self.found.of_motors
-        where = "of motors, by name, note or start" if of_motors else "where numbers are motor side"
-        lines = [f"{'' if of_motors or current else '# '}[drive]   # {where}: {_MOTORS}"]
-        if of_motors:
-            ratio = f'transmission = "{BLANK}"   # gear ratio of each joint; '
-            lines.append(f"{ratio}remove it where they are the joints'")
-        if gear is not None:
-            ratios = f": transmission = [{', '.join([f'{gear.number:g}'] * n)}]" * bool(gear.value)
-            said = f"'{clean(gear.words.strip(chr(39)), 200)}'"
-            lines.append(f"# the file states {said}{ratios}, + where motor and joint turn alike")
-        elif not of_motors:
-            lines.append(f"# transmission = [{', '.join(['100.0'] * n)}]")
-        if current:
-            said_of = [note.strip("# ") for note in notes if _TORQUE_CONSTANT.search(note)][:3]
-            lines += [f"# the file states '{clean(line, 200)}'" for line in said_of]
-            constant = f'torque_constant = "{BLANK}"'
-            lines.append(f"{constant}             # N m/A, motor side: from the data sheet")
-        return lines
-
-    def _missing(self) -> list[str]:
-        """Return [missing] with what marks a lost sample: numbers, rows of zeros; or nothing."""
-        lines, lost, rows = [], list(self.reading.lost), self.reading.lost_rows
-        if lost:
-            guess = Guess(str(lost), "likely", "far from all other numbers of its column")
-            lines.append(f"values = {lost}   {self.note('missing', guess)}")
-        if rows:
-            why = f"{rows} are zero in all that was measured, far from those around"
-            guess = Guess("rows of zeros", "likely", why)
-            lines.append(f"rows = [0.0]   {self.note('missing', guess)}")
-        return ["[missing]", *lines, ""] if lines else []
-
-    def _resample(self) -> list[str]:
-        if self.found.t is None:
-            return []
-        steps, median = np.diff(self.found.t), median_step(self.found.t)
-        uneven = float(np.percentile(np.abs(steps - median), 95)) / median
-        if uneven < EVIDENCE.even:
-            even = f"time is even within {100 * uneven:.2g} %, every {1e3 * median:.6g} ms"
-            return [f"# {even}: nothing to resample"]
-        rate = round_rate(1.0 / median)
-        why = f"steps of {1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms, median "
-        why += f"{1e3 * median:.4g} ms: the next round rate below, so that no sample is invented"
-        note = self.note("resample", Guess(f"{rate:g} Hz", "likely", why))
-        return ["[resample]", f"rate = {rate:g}   {note}", 'method = "spline"']
-
-
-def _out_of_order(found: Findings, group: Group) -> bool:
-    """Return whether the joints' order is open: foreign words, in no order from the base."""
-    if group.order != "file" or len(group.columns) == 1 or found.reading.by_evidence:
-        return group.order == "text"
-    lower, parts = [column.lower() for column in group.columns], list(enumerate(_BASE_TO_TIP))
-    ranks = [next((k for k, part in parts if part in name), -1) for name in lower]
-    return -1 in ranks or ranks != sorted(ranks) or lower == sorted(lower)
-
-
-def _doubt(found: Findings, signal: str) -> str | None:
-    """Return why the columns of a signal are left open, "" without a reason; None otherwise.
-
-    A word that the other signal's names have not may say more, unless a velocity or the robot's
-    links confirm it.
+    Raises:
+        InputRejected: F16 too many columns, T08 too few samples.
     """
-    pair = found.reading.q.group, found.reading.tau.group
-    (group, other), links = pair if signal == "q" else pair[::-1], found.links
-    if group is None or _out_of_order(found, group):
+    if len(table.columns) > GUESS.most_columns:
+        message = f"{len(table.columns)} columns: too many to guess what each is"
+        remedy = "export the joints' signals alone, or write the recipe"
+        raise InputRejected("F16", message, where=path, remedy=remedy)
+    known = {c: np.isfinite(x) & (np.abs(x) < GUESS.no_number) for c, x in table.columns.items()}
+    usable = [c for c, mask in known.items() if mask.mean() > GUESS.usable]
+    keep = np.all([known[c] for c in usable], axis=0) & bool(usable)
+    if keep.sum() < FEWEST:
+        message, remedy = f"{keep.sum()} samples without a hole", "give a recording of a motion"
+        raise InputRejected("T08", message, where=table.source, remedy=remedy)
+    columns = {c: table.columns[c][keep] for c in usable}
+    return replace(table, columns=columns, rows=table.rows[keep], lines=None)
+
+
+def _robot_beside(
+    folder: Path, named: str | None
+) -> tuple[list[str], RobotDescription | None, str]:
+    """Return the robots in the folder, the only one that can be read, and why it cannot."""
+    if named is not None:
+        return [named], load_robot(named), ""
+    found: list[tuple[str, RobotDescription | None, str]] = []
+    urdf = sorted(folder.glob("*.urdf"))[: GUESS.most_robots]
+    for path in urdf or sorted(folder.glob("*.toml"))[: GUESS.most_robots]:
+        try:
+            found.append((path.name, load_robot(path), ""))
+        except RrridError as problem:  # of TOML, a recipe or another file
+            if urdf:
+                found.append((path.name, None, f"{problem.message}. {problem.remedy}"))
+    files = [name for name, *_ in found]
+    return (files, *found[0][1:]) if len(found) == 1 else (files, None, "")
+
+
+class _Units:
+    """The unit of time and of each signal, by names and by the two relations."""
+
+    def __init__(
+        self, table: RawTable, roles: Roles, arm: RobotDescription | None, model: TorqueModel | None
+    ) -> None:
+        self.roles, self.arm = roles, arm
+        q, tau = (roles.chosen.get(signal) for signal in ("q", "tau"))
+        self.time = _time_unit(roles.clock)
+        named = roles.clock is not None and self.time.value in UNITS
+        self.t = _seconds(roles.clock, self.time.value) if roles.clock and named else None
+        self.q, self.dq, self.tau = Guess("", ""), Guess("", ""), Guess("", "")
+        self.doubt = ""  # why motion and torque are both left open
+        if q is not None:
+            self.q = self._of_position(matrix(table, q), q)
+        if tau is not None and (own := _own(tau)):
+            why = "named so" if own in UNITS else f"named '{own}'"
+            self.tau = Guess(own if own in UNITS else "", why, own in UNITS)
+        turning = arm is not None and all(joint.revolute for joint in arm.joints)
+        angles = self.q.value in _ANGLES or not (self.q.value or self.q.why)
+        joints_own = not any(group.name.motor for group in (q, tau) if group)
+        if q and tau and model and turning and angles and joints_own and self.t is not None:
+            self._by_links(model, matrix(table, q), matrix(table, tau), tau, self.t)
+        if "dq" in roles.chosen:
+            self.dq = self._of_velocity(roles.chosen["dq"])
+
+    def _of_position(self, values: Array, group: Group) -> Guess:
+        """Return the unit of positions: named, or such that the velocity is their slope."""
+        named, slope = _own(group), self.roles.slope
+        speed = UNITS.get(_own(self.roles.chosen["dq"])) if slope is not None else None
+        step = _TIMES.get(self.time.value)
+        ratio = math.nan
+        if slope is not None and speed is not None and step is not None:
+            ratio = speed.factor * step / slope  # the SI of one recorded unit
+        if not named or named not in UNITS:
+            near = [u for u, f in _ANGLES.items() if abs(ratio / f - 1.0) < GUESS.same_ratio]
+            if named or not near:
+                return Guess(named if named == "counts" else "", f"named '{named}'" * bool(named))
+            return Guess(near[0], "the recorded velocity is the slope of the position")
+        if abs(ratio / UNITS[named].factor - 1.0) > GUESS.same_ratio:  # False for nan
+            return Guess("", f"named '{named}', but the recorded velocity is not its slope")
+        spans = np.ptp(values, axis=0) if self.arm else ()
+        for span, joint in zip(spans, self.arm.joints if self.arm else (), strict=True):
+            low, high = joint.position
+            if span * UNITS[named].factor > GUESS.twice_room * (high - low):
+                why = f"its name or header says '{named}', but joint '{joint.name}' would move over"
+                return Guess("", f"{why} {span:.4g} {named}, beyond its limits")
+        return Guess(named, "named so", True)
+
+    def _by_links(self, model: TorqueModel, q: Array, tau: Array, group: Group, t: Array) -> None:
+        """Take or refute units by what the robot's own links ask for."""
+        fits: dict[str, LinkFit] = {}
+        for unit in dict.fromkeys(("rad", "deg", *([self.q.value] if self.q.value else []))):
+            fit = fit_links(model, q * UNITS[unit].factor, t, tau)
+            fits |= {} if fit is None else {unit: fit}
+        if not fits:
+            return
+        best = min(fits, key=lambda unit: fits[unit].unexplained)
+        own = fits.get(self.q.value or best, fits[best])
+        if own.unexplained > GUESS.refutes and fits[best].unexplained > GUESS.refutes:
+            self.doubt = "torque and motion do not agree by the robot's own links: other torques, "
+            self.doubt += "or the order, unit or zero of the joints?"
+            return
+        named = UNITS.get(self.tau.value)
+        most = GUESS.gain if named else GUESS.unnamed_gain
+
+        def near(fit: LinkFit) -> bool:  # as large as the links' torque, in N m
+            gains = fit.gains * (named.factor if named else 1.0)
+            return gains.size > 0 and bool(((gains > 1.0 / most) & (gains < most)).all())
+
+        # Gears near 57 make radians of a motor look like degrees of a joint, but for the torque.
+        worse = [GUESS.better * fit.unexplained for name, fit in fits.items() if name != best]
+        proved = fits[best].unexplained < min(GUESS.proves, *worse, 1.0)
+        proved &= best == "rad" or near(fits[best])
+        follows = "the torque follows from the motion by the robot's links"
+        if proved and not self.q.value and not self.q.why:
+            self.q = Guess(best, f"{follows} in {best}")
+        elif proved and self.q.value not in ("", best):
+            self.q = Guess("", f"says '{self.q.value}', but {follows} if it is in {best}")
+        if group.name.quantity != "torque":
+            return
+        own = fits.get(self.q.value, own)
+        if not near(own):
+            why = f"{np.round(own.gains, 3).tolist()} times what weight and inertia of the robot's "
+            self.tau = Guess("", f"{why}links ask for: another unit or sign, or the motor's side?")
+        elif proved and self.q.value and not _own(group):
+            self.tau = Guess("N m", f"{follows} in N m")
+        if group.name.origin == "commanded" and not proved:
+            self.doubt = "the command is not the torque that the robot's own links ask for"
+
+    def _of_velocity(self, group: Group) -> Guess:
+        """Return the unit of a velocity; "" unless it is the slope of the position."""
+        slope, angle, step = self.roles.slope, UNITS.get(self.q.value), _TIMES.get(self.time.value)
+        if slope is None or angle is None or step is None:
+            return Guess("", "not the slope of the position" if slope is None else "")
+        size = slope * angle.factor / step
+        near = [u for u, f in _SPEEDS.items() if abs(size / f - 1.0) < GUESS.same_ratio]
+        named = _own(group)
+        unit = named if named in near or not near or not named else ""
+        return Guess(unit or (near[0] if near and not named else ""), "the slope of the position")
+
+
+def _own(group: Group) -> str:
+    """Return the unit that names say of all columns of a group, as `UNITS` spells it, else ""."""
+    return canonical_unit(group.unit) if group.unit else ""
+
+
+def _time_unit(clock: Clock | None) -> Guess:
+    """Return the unit of a clock: named, by the century it counts to, or by a plausible rate."""
+    if clock is None:
+        return Guess("", "no column rises steadily: only you know the rate")
+    if len(clock.columns) > 1:
+        return Guess("s", f"whole seconds and {clock.units[1]} together rise", True)
+    named = canonical_unit(clock.units[0]) if clock.units[0] else ""
+    if named == "sample":
+        return Guess("sample", "named a counter: the rate is not in the file")
+    steps = np.diff(clock.values)
+    step = float(np.median(steps[steps > 0]))
+    if named:
+        known = UNITS[named].factor if named in UNITS else math.nan
+        plausible = CLOCK.slowest <= 1.0 / (step * known) <= CLOCK.fastest
+        why = "named so" if plausible else f"named '{named}', at no rate of a robot"
+        return Guess(named if plausible else "", why, plausible)
+    if clock.values[0] in (0.0, 1.0) and (steps == 1.0).all():
+        return Guess("", "counts 1, 2, 3, …: ms, or samples?")
+    rates = {u: 1.0 / (step * f) for u, f in _TIMES.items()}
+    fits = [u for u, rate in rates.items() if GUESS.slowest <= rate <= GUESS.fastest]
+    since = [u for u, f in _TIMES.items() if CLOCK.from_2001 < clock.values[0] * f < CLOCK.to_2096]
+    fits = [u for u in fits if u in since] or fits
+    if len(fits) == 1:
+        return Guess(fits[0], f"steps of {step:.6g} are {rates[fits[0]]:.6g} Hz")
+    return Guess("", f"steps of {step:.6g}: {' or '.join(fits) or 'no usual unit'}")
+
+
+def _seconds(clock: Clock, unit: str) -> Array:
+    factor = 1.0 if len(clock.columns) > 1 else UNITS[unit].factor
+    return np.asarray((clock.values - clock.values[0]) * factor, dtype=np.float64)
+
+
+def _robot_lines(files: Sequence[str], problem: str, named: bool, joints: int) -> list[str]:
+    if len(files) == 1:
+        why = "as --robot says" if named else "check: likely, it lies in the same folder"
+        lines = [f"use = {quoted(files[0])}   # {why}"]
+        lines += [f"# {clean(problem, 300)}"] if problem else []
+        return [*lines, *([f'tip_link = "{BLANK}"'] if "tip_link" in problem else [])]
+    which = "robot.toml, a URDF, or a shipped name"
+    if files:
+        which = f"one of {', '.join(clean(file, 40) for file in files)}"
+    return [f'use = "{BLANK}"   # the robot: {which}']
+
+
+def _torque_kind(group: Group | None) -> str:
+    """Return whether the torque is a held command or sampled, by the name of its columns."""
+    if group is None or (group.name.origin == "plain" and group.name.quantity != "current"):
+        why = "check: unsure, nothing says it; held-command where the drive was commanded"
+        return f'torque = "measured"   # {why}'
+    if group.name.origin == "commanded":
+        return 'torque = "held-command"   # check: likely, it is named a command'
+    return 'torque = "measured"   # named so, or a current, which is sampled like the position'
+
+
+def _time_lines(clock: Clock | None, unit: Guess) -> list[str]:
+    if clock is None:
+        return [f'rate = "{BLANK}"   # Hz; {clean(unit.why, 200)}']
+    if len(clock.columns) > 1:
+        columns, units = (", ".join(map(quoted, x)) for x in (clock.columns, clock.units))
+        return [f"column = [{columns}]", f"unit = [{units}]   {unit.comment}"]
+    lines = [f"column = {quoted(clock.columns[0])}"]
+    lines += [f'unit = "{unit.value or BLANK}"   {unit.comment}']
+    return [*lines, *([f'rate = "{BLANK}"   # Hz'] if unit.value == "sample" else [])]
+
+
+def _signal_lines(table: RawTable, roles: Roles, units: _Units) -> list[str]:
+    lines = []
+    for signal, unit in (("q", units.q), ("dq", units.dq), ("tau", units.tau)):
+        group, others = roles.chosen.get(signal), roles.others.get(signal, ())
+        doubt = units.doubt or _unexplained(signal, roles)
+        if signal == "dq":
+            if group and unit.value and not doubt:
+                lines.append(f"dq = {{ {columns_of(group, table)}, unit = {quoted(unit.value)} }}")
+                lines.append(f"    {unit.comment}; remove the line where it was not measured")
+            elif group:
+                lines.append(f"    # left out, a velocity: {columns_of(group, table)}")
+            continue
+        if group is None or doubt:
+            lines.append(f'{signal} = {{ columns = "{BLANK}", unit = "{BLANK}" }}')
+            lines[-1] += "" if group or others else "   # no column looks like it"
+            lines += [f"    # {doubt}"] if doubt and group else []
+            candidates = (*((group,) if group else ()), *others)
+            if candidates and all(g.name.origin == "commanded" for g in candidates):
+                lines.append("    # named commands, or the points of a plan: what was measured?")
+            lines += [f"    # candidate: {columns_of(g, table)}" for g in candidates[:8]]
+            if not candidates and table.text:
+                text = ", ".join(f"{clean(k, 40)} ({clean(v, 80)})" for k, v in table.text.items())
+                lines.append(f"    # no columns of numbers: {clean(text, 300)}")
+            continue
+        lines.append(_signal_line(signal, group, unit, roles, table))
+        lines.append(f"    {unit.comment if unit.why else '# no name says the unit'}")
+        if group.order == "the file" and len(group.columns) > 1:
+            lines.append("    # check: joints in the order of the file, from the base to the tip")
+        lines += [f"    # also there: {columns_of(g, table)}" for g in others[:6]]
+    return lines
+
+
+def _signal_line(signal: str, group: Group, unit: Guess, roles: Roles, table: RawTable) -> str:
+    each = [unit.value] * len(group.columns)
+    if not unit.value and not unit.why:  # a unit for each joint, as far as it is named
+        each = [canonical_unit(u) if canonical_unit(u) in UNITS else "" for u in group.units]
+    words = [quoted(u or BLANK) for u in each]
+    said = words[0] if len(set(words)) == 1 else f"[{', '.join(words)}]"
+    more = f', counts_per_rev = "{BLANK}"' if unit.value == "counts" else ""
+    motors = {s: g.name.motor for s, g in roles.chosen.items()}
+    more += ', side = "joint"' if any(motors.values()) and not motors[signal] else ""
+    return f"{signal} = {{ {columns_of(group, table)}, unit = {said}{more} }}"
+
+
+def _unexplained(signal: str, roles: Roles) -> str:
+    """Return why the columns of a signal are open; "" where they are not.
+
+    A word that only one of position and torque has may say more, and words give no order.
+    """
+    group, other = (roles.chosen.get(s) for s in ("q", "tau")[:: 1 if signal == "q" else -1])
+    if group is None or signal == "dq":
         return ""
-    confirmed = links is not None and links.followed and not links.alone
-    words = group.unknown - (other.unknown if other else frozenset())
-    if words and not (signal == "tau" and confirmed):
-        return f"what does '{clean(min(words), 40)}' say of it?"
-    best = min(found.fits.values(), key=lambda fit: fit.unexplained, default=None)
-    for fit in (links, found.fits.get(NAMED, best)):
-        if fit is not None and fit.otherwise:
-            return f"the robot's own links agree far better with {fit.otherwise}"
-    if links is None:
-        return None
-    named = any(named_units(found, group, found.reading.torque_table))
-    if not links.followed and (signal == "q" or not named):
-        disagree = "torque and motion do not agree by the robot's own links"
-        return f"{disagree}: other torques, or the order, unit or zero of the joints?"
-    if links.alone and signal == "tau" and group.origin == "plain":
-        asked = "without friction: computed, or simulated?"
-        return f"it is what the robot's own links ask for, {asked}"
-    return None
+    if group.order == "words":
+        return "in which order are these joints, from the base to the tip?"
+    known = set(other.name.unknown if other else ())
+    words = {word for word in group.name.unknown if word[1:] and word not in known}
+    return f"what does '{clean(min(words), 40)}' say of it?" if words else ""
 
 
-def _units(units: Sequence[str]) -> str:
-    """Return the unit in TOML: one text, or one a joint; FILL IN where one is open."""
-    words = [_quoted(unit or BLANK) for unit in units]
-    return words[0] if len(set(words)) == 1 else f"[{', '.join(words)}]"
+def _files_beside(path: Path) -> list[str]:
+    near = [p for p in sorted(path.parent.iterdir())[: GUESS.most_files] if p.is_file()]
+    others = [quoted(p.name) for p in near if p.suffix == path.suffix and p.name != path.name]
+    return [f"    # if it is in another file: file = {' or '.join(others[:4])}"] if others else []
 
 
-def _columns(names: Sequence[str], table: RawTable) -> str:
+def _drive_lines(roles: Roles) -> list[str]:
+    motor = any(group.name.motor for group in roles.chosen.values())
+    tau = roles.chosen.get("tau")
+    current = tau is not None and tau.name.quantity == "current"
+    law = "q_motor = N q_joint, tau_joint = N^T tau_motor"
+    lines = [f"{'' if motor or current else '# '}[drive]   # where numbers are motor side: {law}"]
+    ratios = "gear ratio of each joint; remove it where the numbers are the joints'"
+    lines += [f'transmission = "{BLANK}"   # {ratios}'] if motor else []
+    constant = f'torque_constant = "{BLANK}"   # N m/A, motor side: from the data sheet'
+    return [*lines, *([constant] if current else [])]
+
+
+def _resample_lines(t: Array | None) -> list[str]:
+    """Return [resample] where the clock is uneven, at the next round rate below."""
+    if t is None:
+        return []
+    steps = np.diff(t)
+    median = float(np.median(steps[steps > 0]))
+    if jitter(steps / median)[0] <= LARGEST_JITTER:
+        return [f"# time is even, every {1e3 * median:.6g} ms: nothing to resample"]
+    decade = 10.0 ** math.floor(math.log10(1.0 / median))
+    rate = max(m for m in GUESS.round_rates if m * decade * median <= 1.0 + 1e-9) * decade
+    why = f"steps of {1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms"
+    return ["[resample]", f"rate = {rate:g}   # check: {why}", 'method = "spline"']
+
+
+def columns_of(group: Group, table: RawTable) -> str:
     """Return columns = "q_{j}" where the names count from 1 to the table's last, else a list."""
+    names = group.columns
     if len(names) == 1:
-        return f"column = {_quoted(names[0])}"
+        return f"column = {quoted(names[0])}"
     before, one, after = names[0].rpartition("1")
     counted = [f"{before}{j}{after}" for j in range(1, len(names) + 2)]
     if one and counted[:-1] == list(names) and counted[-1] not in table.columns:
-        return f"columns = {_quoted(f'{before}{{j}}{after}')}"
-    return f"columns = [{', '.join(map(_quoted, names))}]"
+        return f"columns = {quoted(f'{before}{{j}}{after}')}"
+    return f"columns = [{', '.join(map(quoted, names))}]"
 
 
-def _quoted(text: str) -> str:
+def quoted(text: str) -> str:
+    """Return a text as TOML writes it."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

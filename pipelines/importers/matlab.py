@@ -19,7 +19,7 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.importers.config import ARRAYS
 from pipelines.importers.npy import too_large
-from pipelines.importers.raw import Anything, unit_in
+from pipelines.importers.raw import Anything
 
 _NUMERIC = ("double", "single", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32",
             "uint64", "logical")  # fmt: skip
@@ -174,7 +174,10 @@ def _arrays(name: str, dataset: Any) -> dict[str, Anything]:
     items = dataset.parent.get(f"{stem}_items")
     if items is not None and values.ndim > 1 and items.shape == values.shape[1:]:
         return dict(zip((label.decode() for label in items[()]), values.T, strict=True))
-    return {name + unit_in(dataset.attrs): values}
+    unit = next((dataset.attrs[key] for key in ("unit", "units") if key in dataset.attrs), "")
+    unit = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit
+    said = isinstance(unit, str) and 0 < len(unit) <= ARRAYS.longest_unit
+    return {f"{name} [{unit}]" if said else name: values}
 
 
 def _fields(name: str, records: Anything) -> Iterator[tuple[str, Anything]]:

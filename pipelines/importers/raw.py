@@ -1,7 +1,6 @@
 """Hold a recording as it was read: named columns of numbers, and where they are in the file.
 
-Arrays and nested documents become such a table here: time is the side that most arrays share, and a
-table of one row a joint becomes one of one row a sample.
+Named arrays and nested documents become such a table here: time is the side that most arrays share.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ import itertools
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -18,15 +17,15 @@ import numpy.typing as npt
 
 from pipelines.errors import Check, InputRejected, UsageError, clean, did_you_mean
 from pipelines.importers.config import ARRAYS
-from pipelines.importers.header import split_unit
 from pipelines.importers.names import read_name
 from pipelines.io.limits import FEWEST
 from pipelines.io.log import Array
+from pipelines.io.units import UNITS, canonical_unit
 
 Anything = npt.NDArray[Any]
 Columns = str | int | tuple[str | int, ...]
-# Entries of a record that the names of its series hold.
-_SAID = ("name", "label", "unit", "units", "einheit")
+_NUMBERED = r"_?\d+$|\[\d+\]$"  # the end of a column of a matrix: "q_1", "q[0]"
+_SAID = ("name", "label", "unit", "units")  # of a record, that the names of its series hold
 _NOT_REAL = {"c": "complex numbers", "O": "objects or cells", "U": "text", "S": "text"}
 
 
@@ -38,11 +37,8 @@ class RawTable:
     columns: Mapping[str, Array]
     rows: npt.NDArray[np.int64]  # (samples,) 0-based
     units: Mapping[str, str] = field(default_factory=dict)  # what a header says
-    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # matrix -> its columns
-    text: Mapping[str, str] = field(default_factory=dict)  # columns of text -> an example
-    labels: Mapping[str, str] = field(default_factory=dict)  # those that hold one text throughout
-    notes: tuple[str, ...] = ()  # lines above the table that name no column
-    cycles: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # texts that repeat
+    text: Mapping[str, str] = field(default_factory=dict)  # columns of no numbers -> an example
+    notes: tuple[str, ...] = ()  # lines above the table, texts and single numbers beside arrays
     lines: npt.NDArray[np.int64] | None = None  # (samples,) line numbers, in a text file
     breaks: tuple[int, ...] = ()  # first samples after damage: the clock of a fixed rate is lost
     checks: tuple[Check, ...] = ()
@@ -66,14 +62,13 @@ class RawTable:
             message = f"no column {column}; the file has {len(names)} columns of numbers"
             remedy = "columns count from 1; correct the recipe"
             raise InputRejected("S01", message, where=where, remedy=remedy)
-        array = re.sub(r"_\d+$|\[\d+\]$", "", column)  # that has no columns
-        whole = column if column in names or column in self.text else array
-        if whole in self.text:
-            message = f"column '{whole}' holds no numbers but '{self.text[whole]}'"
-            remedy = "export it as numbers, one row a sample, or choose another column"
-            raise InputRejected("S12", message, where=where, remedy=remedy)
         if column in self.columns:
             return column
+        whole = column if column in self.text else re.sub(_NUMBERED, "", column)
+        if whole in self.text:
+            message = f"column '{whole}' holds no numbers but '{clean(self.text[whole], 80)}'"
+            remedy = "export it as numbers, one row a sample, or choose another column"
+            raise InputRejected("S12", message, where=where, remedy=remedy)
         every, remedy = [*names, *self.text], "correct the recipe"
         there = ", ".join(every[: ARRAYS.listed])
         message = f"no column '{column}'{did_you_mean(column, every)}; there are {there}"
@@ -98,13 +93,14 @@ def expand(
     """
     why = ""
     if isinstance(columns, str) and "{j}" in columns:
-        counted = itertools.count(n + 1)
         name = columns.replace
+        counted = itertools.count(n + 1)
         have = next(j - 1 for j in counted if name("{j}", str(j)) not in table.columns)
         why = f"'{name('{j}', str(n + 1))}' is there as well"
         columns = tuple(name("{j}", str(j)) for j in range(1, have + 1))
-    elif isinstance(columns, str) and columns not in table.columns and columns in table.groups:
-        columns = table.groups[columns]
+    elif isinstance(columns, str) and columns not in table.columns:
+        members = [name for name in table.columns if re.sub(_NUMBERED, "", name) == columns]
+        columns = tuple(members) or columns
     chosen = (columns,) if isinstance(columns, str | int) else columns
     if len(chosen) != n:
         why = why or "the recipe names " + ", ".join(str(c) for c in chosen)
@@ -122,37 +118,53 @@ def expand(
     return names
 
 
-def flatten(
-    document: Any, path: str = "", depth: int = ARRAYS.deepest
-) -> Iterator[tuple[str, Any]]:
+def split_unit(name: str) -> tuple[str, str]:
+    """Return ("q1", "deg") for "q1 [deg]" or "q1 (deg)"; an index in brackets is no unit."""
+    found = re.fullmatch(r"(.*\S)\s*[\[(（]\s*([^\[\]()（）]+?)\s*[\])）]", name.strip())
+    if not found or len(found[2]) > ARRAYS.longest_unit or set(found[2]) <= set("0123456789 ,:"):
+        return name.strip(), ""
+    return found[1], found[2]
+
+
+def names_and_units(cells: list[str]) -> tuple[list[str], dict[str, str]]:
+    """Return names of columns, and the units in brackets behind them.
+
+    Names that differ only in their brackets keep them: "q[elbow]", "axis 1 (deg)", "axis 1 (Nm)".
+    """
+    pairs = [split_unit(cell) for cell in cells]
+    times = Counter(name for name, _ in pairs)
+    names, units = [], dict[str, str]()
+    for j, (cell, (short, unit)) in enumerate(zip(cells, pairs, strict=True), start=1):
+        name = (cell.strip() if times[short] > 1 else short) or f"column_{j}"
+        names.append(name)
+        if unit and (times[short] == 1 or canonical_unit(unit) in UNITS):
+            units[name] = unit
+    return names, units
+
+
+def flatten(value: Any, path: str = "", depth: int = ARRAYS.deepest) -> Iterator[tuple[str, Any]]:
     """Yield (path, value) of all in nested objects and lists of objects that is neither.
 
-    A record that names itself gives that name to its samples: {"name": "hip", "unit": "rad",
+    A record that names itself gives that name to its series: {"name": "hip", "unit": "rad",
     "values": […]} is "hip [rad]", and with several series "hip.values" and so on.
     """
-    items: list[tuple[str, Any]] = []
-    if isinstance(document, Mapping):
-        texts = {str(key).lower(): x for key, x in document.items() if isinstance(x, str)}
-        name = (texts.get("name") or texts.get("label") or "")[: ARRAYS.longest_text]
-        own = name + unit_in(texts) if name else ""
-        series = [key for key, value in document.items() if own and _is_series(value)]
-        alone = [key for key in series if read_name(key).quantity != "time"]
-        for key, value in document.items():
-            if not series or str(key).lower() not in _SAID:
-                stem = name if key in series else path
-                items.append((own if alone == [key] else f"{stem}.{key}".lstrip("."), value))
-    elif isinstance(document, list) and document and all(isinstance(x, Mapping) for x in document):
-        items = [(f"{path}[{k}]", item) for k, item in enumerate(document)]
+    of_objects = isinstance(value, list) and value and all(isinstance(x, Mapping) for x in value)
+    if isinstance(value, Mapping) and depth:
+        said = {str(key).lower(): x for key, x in value.items() if isinstance(x, str) and x}
+        own = said.get("name") or said.get("label") or ""
+        unit = said.get("unit") or said.get("units") or ""
+        series = [key for key, x in value.items() if own and _is_series(x)]
+        for key, inner in value.items():
+            if len(series) == 1 and key == series[0]:
+                yield f"{own} [{unit}]" if unit else own, inner
+            elif not series or str(key).lower() not in _SAID:
+                stem = own if key in series else path
+                yield from flatten(inner, f"{stem}.{key}".lstrip("."), depth - 1)
+    elif of_objects and depth:
+        for k, inner in enumerate(value):
+            yield from flatten(inner, f"{path}[{k}]", depth - 1)
     else:
-        yield path or "column", document
-    for inner, value in items if depth else ():
-        yield from flatten(value, inner, depth - 1)
-
-
-def unit_in(record: Mapping[str, Any]) -> str:
-    """Return " [rad]" of a record, or of an array's attributes, with an entry for the unit."""
-    unit = next((v for key, v in record.items() if key.lower() in _SAID[2:]), "")
-    return f" [{unit}]" if isinstance(unit, str) and 0 < len(unit) <= ARRAYS.longest_unit else ""
+        yield path or "column", value
 
 
 def _is_series(value: Any) -> bool:
@@ -161,32 +173,36 @@ def _is_series(value: Any) -> bool:
     return isinstance(value, list) and len(value) > 1 and not isinstance(value[0], str | Mapping)
 
 
-def columns_of_arrays(arrays: Mapping[str, Anything], source: str) -> RawTable:
-    """Return a table of named arrays of one or two dimensions (JSON, NPY, MAT).
+def table_of(document: Any, source: str) -> RawTable:
+    """Return a table of nested documents of named arrays of one or two dimensions.
 
     The samples are the side that most arrays share; texts and single numbers are notes.
 
     Raises:
-        InputRejected: S11 where arrays can be read both ways, S12 where none holds real numbers.
+        InputRejected: S03 two series of one name, S11 where arrays can be read both ways, S12 where
+            none holds real numbers.
     """
-    # MATLAB's timeseries of a vector is (n, 1, samples).
-    arrays = {k: array.squeeze() if array.shape[2:] else array for k, array in arrays.items()}
+    arrays: dict[str, Anything] = {}
+    for name, value in flatten(document):
+        if (array := array_of(value)) is None:
+            continue
+        if name in arrays:
+            message = f"two series are both named '{clean(name, 80)}'"
+            remedy = "rename one of them in the file"
+            raise InputRejected("S03", message, where=source, remedy=remedy)
+        # MATLAB's timeseries of a vector is (n, 1, samples).
+        arrays[name] = array.squeeze() if array.shape[2:] else array
     problems = {name: _not_real(array) for name, array in arrays.items() if array.size != 1}
     text = {name: problem for name, problem in problems.items() if problem}
     usable = {k: array for k, array in arrays.items() if k not in text and array.size > 1}
     samples = _samples_of(usable, source)
-    checks: list[Check] = []
-    columns, units = dict[str, Array](), dict[str, str]()
-    groups: dict[str, tuple[str, ...]] = {}
-    others: list[str] = []
+    columns, units, checks = dict[str, Array](), dict[str, str](), list[Check]()
     for name, array in usable.items():
         matrix = array[:, None] if array.ndim == 1 else array
         rows, wide = matrix.shape
         if samples not in matrix.shape or rows == wide:
             why = "square" if rows == wide else f"not of {samples} samples"
             text[name] = f"an array of shape {array.shape}, {why}"
-            long = samples not in matrix.shape and max(matrix.shape) >= FEWEST
-            others += [f"'{clean(name, 40)}'"] if long else []
             continue
         matrix = matrix if rows == samples else matrix.T
         if matrix.shape[1] > ARRAYS.widest:
@@ -197,11 +213,11 @@ def columns_of_arrays(arrays: Mapping[str, Anything], source: str) -> RawTable:
             checks.append(Check.of("S11", "warn", words, where=source, remedy=remedy))
         short, unit = split_unit(name)
         several = tuple(f"{short}_{j + 1}" for j in range(matrix.shape[1]))
-        groups[short] = names = several if several[1:] else (short,)
+        names = several if several[1:] else (short,)
         units |= dict.fromkeys(names, unit) if unit else {}
         columns |= zip(names, np.ascontiguousarray(matrix.T, dtype=np.float64), strict=True)
-    if others:
-        message = f"left out, not of {samples} samples: {', '.join(others[:8])}"
+    if others := [name for name, why in text.items() if why.endswith(" samples")]:
+        message = f"left out, not of {samples} samples: {', '.join(map(repr, others[:8]))}"
         remedy = "save another motion as a file of its own"
         checks.append(Check.of("S11", "warn", message, where=source, remedy=remedy))
     if not columns:
@@ -209,45 +225,50 @@ def columns_of_arrays(arrays: Mapping[str, Anything], source: str) -> RawTable:
         message = f"no array of real numbers; there is {found}"
         remedy = "save plain numeric arrays, one row a sample"
         raise InputRejected("S12", message, where=source, remedy=remedy)
-    return RawTable(source, columns, np.arange(samples), units, groups, text,
-                    checks=tuple(checks), notes=notes_of(arrays))  # fmt: skip
+    notes = [
+        f"{name} = {' '.join(map(str, array.flat))[: ARRAYS.longest_text]}"
+        for name, array in arrays.items()
+        if array.size == 1 or (array.dtype.kind == "U" and array.size <= ARRAYS.widest)
+    ]
+    return RawTable(source, columns, np.arange(samples), units, text,
+                    checks=tuple(checks), notes=tuple(notes[: ARRAYS.most_notes]))  # fmt: skip
 
 
-def notes_of(arrays: Mapping[str, Anything]) -> tuple[str, ...]:
-    """Return "physics_dt = 0.005" of texts and single numbers, whose names may be paths."""
-    found = []
-    for name, array in arrays.items():
-        text = array.dtype.kind == "U" and array.size <= ARRAYS.most_keys
-        if text or (array.size == 1 and array.dtype.kind in "fiub"):
-            found.append(f"{name} = {' '.join(map(str, array.flat))[: ARRAYS.longest_text]}")
-    return tuple(found[: ARRAYS.most_notes])
+def array_of(value: Any) -> Anything | None:
+    """Return an array of numbers or of texts; None of anything else."""
+    if isinstance(value, np.ndarray):
+        return value if value.dtype.kind != "V" else None  # records
+    if isinstance(value, str | int | float):
+        return np.array(value) if not isinstance(value, int) or abs(value) < 2**63 else None
+    if not isinstance(value, list):
+        return None
+    try:
+        return np.array(value, np.str_ if isinstance(value[0], str) else np.float64)
+    except (ValueError, TypeError, OverflowError, IndexError):
+        return None
 
 
 def _samples_of(arrays: Mapping[str, Anything], source: str) -> int:
-    """Return the number of samples: the side of most arrays, the longer one of two shared alike."""
+    """Return the number of samples: the side of most arrays, the longer one of two shared alike.
+
+    Raises:
+        InputRejected: S11, either side of a matrix may be time.
+    """
     shared: Counter[int] = Counter()
-    for array in arrays.values():
-        rows, wide = (array.shape[0], 1) if array.ndim == 1 else array.shape
+    shapes = {k: (array.shape[0], *array.shape[1:], 1)[:2] for k, array in arrays.items()}
+    for rows, wide in shapes.values():
         sides = ((rows, wide), (wide, rows))
         shared.update({n for n, other in sides if n > 1 and other <= ARRAYS.widest})
     enough = {n: count for n, count in shared.items() if n >= FEWEST} or dict(shared)
     samples = max(enough, key=lambda n: (enough[n], n), default=0)
-    matrices = {k: x.shape for k, x in arrays.items() if x.ndim > 1 and 1 not in x.shape}
-    open_ = [name for name, shape in matrices.items() if shape == (samples, samples)]
-    if len(open_) != enough.get(samples):
-        ratio = ARRAYS.clearly_longer
-        open_ = [
-            name
-            for name, (rows, wide) in matrices.items()
-            if samples in (rows, wide)
-            # Neither side is clearly longer, and as many arrays have the other one:
-            and not (rows >= ratio * wide or wide >= ratio * rows or (rows > wide < ratio))
-            and enough.get(rows + wide - samples) == enough[samples]
-        ]
-    if open_:
-        message = f"'{open_[0]}' has shape {matrices[open_[0]]}: which side is time is not known"
-        remedy = "store one row a sample, with many more samples than columns"
-        raise InputRejected("S11", message, where=source, remedy=remedy)
+    matching = {k: shape for k, shape in shapes.items() if samples in shape}
+    only_square = all(rows == wide for rows, wide in matching.values())
+    for name, (rows, wide) in matching.items():
+        near = rows != wide and max(rows, wide) < ARRAYS.clearly_longer * min(rows, wide)
+        if only_square or (near and enough.get(rows) == enough.get(wide)):
+            message = f"'{name}' has shape {(rows, wide)}: which side is time is not known"
+            remedy = "store one row a sample, with many more samples than columns"
+            raise InputRejected("S11", message, where=source, remedy=remedy)
     return samples
 
 
@@ -263,92 +284,3 @@ def _not_real(array: Anything) -> str:
         if rounding > max(1.0, ARRAYS.rounded * float(np.median(np.abs(np.diff(values))))):
             return f"{array.dtype} beyond 2^53, which a real number of 64 bit cannot hold exactly"
     return f"an array of {array.ndim} dimensions" if array.shape[2:] or not array.shape else ""
-
-
-def unstacked(table: RawTable) -> RawTable:
-    """Return a table of one row a joint with one row a sample; any other table as it is.
-
-    A key is a column of names or numbers that goes through the same k, all different, again and
-    again. Rows of one key continue each other and neighbouring rows do not: what merely counts
-    modulo k in one motion is no key. Of key "joint", "position" becomes "position[elbow]", …; what
-    the k rows of every sample share stays one column.
-
-    Raises:
-        InputRejected: S11, the rows of a key come below those of another.
-    """
-    keys = (*table.cycles.items(), *itertools.islice(_numbers_in_turn(table), ARRAYS.most_keys))
-    for key, words in keys:
-        if len(set(words)) == len(words) and any(
-            _interleaved(values, len(words)) for values in table.columns.values()
-        ):
-            return _by_key(table, key, words)
-    for name, stamps in table.columns.items():
-        # A date comes again and the stamps rise from it again. Runs of one experiment do so too,
-        # but their clock starts from zero or goes on.
-        falls = np.flatnonzero(np.diff(stamps) < 0) + 1
-        again = falls.size and (stamps[falls] == stamps[0]).all() and stamps[0] > np.ptp(stamps)
-        if again and read_name(name).quantity == "time":
-            message = f"the same times come {falls.size + 1} times: series below each other"
-            where = f"{table.source}, column '{name}', {table.place(int(falls[0]))}"
-            remedy = "put them side by side, one row a sample: pivot in pandas or in the data base"
-            raise InputRejected("S11", message, where=where, remedy=remedy)
-    return table
-
-
-def _by_key(table: RawTable, key: str, words: tuple[str, ...]) -> RawTable:
-    """Return the table with the rows of every sample side by side."""
-    k = len(words)
-    samples = table.rows.size // k
-    message = f"{k} rows a sample, one for each '{clean(key, 40)}': put beside each other"
-    columns: dict[str, Array] = {}
-    groups: dict[str, tuple[str, ...]] = {}
-    units: dict[str, str] = {}
-    for name, values in table.columns.items():
-        rows = values[: samples * k].reshape(samples, k)
-        members: tuple[str, ...] = (name,)
-        if np.array_equal(rows, np.broadcast_to(rows[:, :1], rows.shape), equal_nan=True):
-            columns[name] = rows[:, 0].copy()
-        elif not np.array_equal(rows[1:], rows[:-1]):  # the numbers of the keys themselves
-            groups[name] = members = tuple(f"{name}[{word}]" for word in words)
-            columns |= zip(members, np.ascontiguousarray(rows.T), strict=True)
-            if read_name(name).quantity == "time":
-                apart = np.median(np.nan_to_num(abs(rows - rows[:, :1])), axis=0).max()
-                message += f"; '{clean(name, 40)}' differs by {apart:.3g} in its own unit among"
-                message += " them, the log has one time"
-        if name in table.units:
-            units |= dict.fromkeys(members, table.units[name])
-    remedy = "export one row a sample"
-    check = Check.of("S11", "warn", message, where=table.source, remedy=remedy)
-    first = slice(0, samples * k, k)
-    return replace(
-        table,
-        columns=columns,
-        rows=table.rows[first] // k,
-        units=units,
-        groups=groups,
-        cycles={},
-        lines=None if table.lines is None else table.lines[first],
-        checks=(*table.checks, check),
-        breaks=tuple(sorted({at // k for at in table.breaks})),
-    )
-
-
-def _numbers_in_turn(table: RawTable) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield columns of whole numbers that repeat, and the numbers they go through."""
-    for name, values in table.columns.items():
-        again = np.flatnonzero(values[1 : ARRAYS.most_keys + 1] == values[:1]) + 1
-        k = int(again[0]) if again.size else 0
-        if k <= 1 or values.size < 2 * k or not np.array_equal(values[k:], values[:-k]):
-            continue
-        if (values[:k] == np.round(values[:k])).all():
-            yield name, tuple(f"{value:.0f}" for value in values[:k])
-
-
-def _interleaved(values: Array, k: int) -> bool:
-    """Return whether every k-th number of a column goes on where its neighbours jump."""
-    from_key, from_row = values[k:] - values[:-k], np.diff(values)
-    known = np.isfinite(from_key)
-    if not known.any() or not from_key[known].any():
-        return False
-    neighbours = np.abs(from_row[np.isfinite(from_row)]).mean()
-    return bool(np.abs(from_key[known]).mean() < ARRAYS.separate * neighbours)

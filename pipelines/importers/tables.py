@@ -1,11 +1,10 @@
-"""Read a recorded file by its content: text, JSON, YAML, NPY, NPZ, Parquet, MAT or HDF5.
+"""Read a recorded file by its content: text, JSON, NPY, NPZ, Parquet, MAT or HDF5.
 
-JSON and the YAML of `ros2 topic echo` hold arrays by name, or frames:
+JSON holds arrays by name, or frames:
 
-[{"t": 0.0, "q": [0.1, 0.2]}, …], or one frame a line   columns t, q[0], q[1]
-{"frames": [{"joints": {"j1": {"pos": 0.1}}}, …]}       joints.j1.pos
 {"t": [0.0, …], "q": [[0.1, 0.2], …]}                   t, q_1, q_2
-position: - 0.1 - 0.2 --- (in lines of their own)       position[0], position[1]
+[{"t": 0.0, "q": [0.1, 0.2]}, …], or one frame a line   the same
+{"frames": [{"joints": {"j1": {"pos": 0.1}}}, …]}       joints.j1.pos
 """
 
 from __future__ import annotations
@@ -14,29 +13,20 @@ import fcntl
 import hashlib
 import json
 import os
-import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pipelines.errors import Check, EnvironmentFault, InputRejected, UsageError, clean
+from pipelines.errors import Check, EnvironmentFault, InputRejected, UsageError
 from pipelines.importers import matlab, npy
 from pipelines.importers.config import ARRAYS
-from pipelines.importers.raw import (
-    Anything,
-    RawTable,
-    columns_of_arrays,
-    flatten,
-    notes_of,
-    unstacked,
-)
+from pipelines.importers.raw import RawTable, flatten, table_of
 from pipelines.importers.recipe import TextFormat
 from pipelines.importers.text import read_text
 from pipelines.io.limits import FEWEST
-from pipelines.io.log import Array
 from pipelines.io.output import fault_of
 from pipelines.io.sandbox import Answer, guarded, regular_file
 
@@ -53,7 +43,6 @@ _REFUSED = (
     (b"ARROW1", "F06", "an Arrow (Feather) file", "save it as Parquet"),
 )  # fmt: skip
 _PICKLES = (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|nan|[+-]?inf", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -113,30 +102,29 @@ def read_table(path: Path, text: TextFormat | None = None, name: str = "") -> Ra
     """
     data, source = _bytes_of(path), name or path.name
     reader = _reader_of(data, source)
+
+    def work() -> RawTable:
+        content = reader.read(data, path, source)
+        return content if isinstance(content, RawTable) else table_of(content, source)
+
     if reader.kind == "text":
-        detect = text in (None, TextFormat()) and len(data) <= ARRAYS.largest_json
-        table = (read_yaml(data, source) if detect else None) or read_text(data, source, text)
+        table = read_text(data, source, text)
     elif reader.library is not None:
         reader.library()  # before the fork, so that every child has it
-        table = _in_child(lambda: _table(reader.read(data, path, source), source), path, source)
+        table = _in_child(work, path, source)
     else:
-        table = _table(reader.read(data, path, source), source)
+        table = work()
     longest = max((*table.columns, *table.text, ""), key=len)
     if len(longest) > ARRAYS.longest_name:
         message = f"the name of a column has {len(longest)} characters, {longest[:40]} …"
         remedy = "export the table with a header of short names"
         raise InputRejected("F16", message, where=source, remedy=remedy)
-    table = unstacked(table)
     checks, ending = table.checks, path.suffix.lower()
     foreign = reader.kind != "text" or any(ending in other.endings for other in READERS)
     if ending not in reader.endings and foreign:
         message = f"named '{path.suffix}', but its content is {reader.kind}; read as that"
         checks = (Check.of("F06", "warn", message, where=source, remedy="rename it"), *checks)
     return replace(table, checks=checks, sha256=hashlib.sha256(data).hexdigest())
-
-
-def _table(content: Mapping[str, Any] | RawTable, source: str) -> RawTable:
-    return content if isinstance(content, RawTable) else table_of_document(content, source)
 
 
 def _bytes_of(path: Path) -> bytes:
@@ -200,7 +188,6 @@ def _in_child(read: Callable[[], RawTable], path: Path, source: str) -> RawTable
             "text": dict(table.text),
             "units": dict(table.units),
             "notes": list(table.notes),
-            "groups": {name: list(columns) for name, columns in table.groups.items()},
             "checks": [check.as_dict() for check in table.checks],
         }
         return Answer(about, {str(i): x for i, x in enumerate(table.columns.values())})
@@ -216,7 +203,6 @@ def _in_child(read: Callable[[], RawTable], path: Path, source: str) -> RawTable
             text=about["text"],
             units=about["units"],
             notes=tuple(about["notes"]),
-            groups={key: tuple(names) for key, names in about["groups"].items()},
             checks=tuple(Check(**check) for check in about["checks"]),
         )
     except InputRejected as problem:
@@ -227,11 +213,11 @@ def _in_child(read: Callable[[], RawTable], path: Path, source: str) -> RawTable
         raise matlab.damaged_mat(source) from None
 
 
-def read_json(data: bytes, source: str) -> RawTable:
-    """Return the table of a JSON recording.
+def read_json(data: bytes, source: str) -> Any:
+    """Return the document of a JSON recording: arrays by name, or frames turned into such.
 
     Raises:
-        InputRejected: F08 no JSON, S12 no samples, X05 too large.
+        InputRejected: F08 no JSON, X05 too large.
     """
     if len(data) > ARRAYS.largest_json:
         message = f"{len(data)} bytes of JSON; import reads up to {ARRAYS.largest_json}"
@@ -250,11 +236,9 @@ def read_json(data: bytes, source: str) -> RawTable:
     document = _frame_of_pandas(document)
     frames = _frames(document, ARRAYS.deepest)
     if frames is None:
-        return table_of_document(document, source)
-    around = flatten(_without(document, frames)) if document is not frames else ()
-    arrays = ((path, _array(value)) for path, value in around)
-    notes = notes_of({path: array for path, array in arrays if array is not None})
-    return _table_of_frames(frames, source, notes)
+        return document
+    around = {} if document is frames else _without(document, frames)
+    return around | _series_of(frames, len(data), source)
 
 
 def _frame_of_pandas(document: Any) -> Any:
@@ -263,12 +247,11 @@ def _frame_of_pandas(document: Any) -> Any:
         return document
     names, rows = document.get("columns"), document.get("data")
     if isinstance(names, list) and isinstance(rows, list) and rows:
-        if all(isinstance(row, list) and len(row) == len(names) for row in rows):
-            return dict(zip(map(str, names), map(list, zip(*rows, strict=True)), strict=True))
-        return document
+        square = all(isinstance(row, list) and len(row) == len(names) for row in rows)
+        columns = map(list, zip(*rows, strict=True)) if square else ()
+        return dict(zip(map(str, names), columns, strict=True)) if square else document
     numbered = all(
-        isinstance(column, dict) and column and all(key.isdecimal() for key in column)
-        for column in document.values()
+        isinstance(x, dict) and x and all(map(str.isdecimal, x)) for x in document.values()
     )
     return {k: list(column.values()) for k, column in document.items()} if numbered else document
 
@@ -290,133 +273,35 @@ def _without(document: Any, frames: object) -> Any:
     return {k: _without(item, frames) for k, item in document.items() if item is not frames}
 
 
-def table_of_document(document: Any, source: str) -> RawTable:
-    """Return the table of nested arrays by name.
-
-    Raises:
-        InputRejected: S03 two series of one name, S12 no samples.
-    """
-    arrays: dict[str, Anything] = {}
-    for name, value in flatten(document):
-        array = _array(value)
-        if array is None:
-            continue
-        if name in arrays:
-            message = f"two series are both named '{clean(name, 80)}'"
-            remedy = "rename one of them in the file"
-            raise InputRejected("S03", message, where=source, remedy=remedy)
-        arrays[name] = array
-    if not arrays:
-        remedy = "save a list of frames, or one array a signal"
-        message = "no list of samples in the file"
-        raise InputRejected("S12", message, where=source, remedy=remedy)
-    return columns_of_arrays(arrays, source)
-
-
-def _array(value: Any) -> Anything | None:
-    """Return an array of numbers or of texts; None of anything else."""
-    if isinstance(value, np.ndarray):
-        return value if value.dtype.kind != "V" else None  # records
-    if isinstance(value, str | int | float):
-        return np.array(value) if not isinstance(value, int) or abs(value) < 2**63 else None
-    if not isinstance(value, list):
-        return None
-    try:
-        return np.array(value, np.str_ if isinstance(value[0], str) else np.float64)
-    except (ValueError, TypeError, OverflowError, IndexError):
-        return None
-
-
-def _table_of_frames(
-    frames: Sequence[Mapping[str, Any]], source: str, notes: tuple[str, ...] = ()
-) -> RawTable:
-    columns: dict[str, Array] = {}
-    groups: dict[str, list[str]] = {}
-    texts: dict[str, list[str]] = {}
+def _series_of(frames: Sequence[Mapping[str, Any]], size: int, source: str) -> dict[str, Any]:
+    """Return an array of each value of the frames in a file of `size` bytes, or its first text."""
+    series: dict[str, list[Any]] = {}
     for i, frame in enumerate(frames):
-        for path, group, value in _cells(frame, "", ARRAYS.deepest):
-            if isinstance(value, str):
-                texts.setdefault(path, []).append(value[: ARRAYS.longest_text])
-            elif isinstance(value, int | float):
-                if path not in columns:
-                    columns[path] = np.full(len(frames), np.nan)
-                    groups.setdefault(group, []).append(path)
-                columns[path][i] = value if abs(value) < ARRAYS.largest_number else np.inf
-        if len(columns) > ARRAYS.most_columns:
+        for path, value in flatten(frame):
+            if path not in series:
+                series[path] = [None] * len(frames)
+            series[path][i] = value
+        cells = len(series) * len(frames)
+        if len(series) > ARRAYS.most_columns or cells > 8 * size + ARRAYS.always:
             message = f"more than {ARRAYS.most_columns} numbers in a frame"
             remedy = "save the signals of the joints alone"
             raise InputRejected("X05", message, where=source, remedy=remedy)
-    if not columns:
-        message, remedy = "the frames hold no numbers", "save the samples as numbers"
-        raise InputRejected("S12", message, where=source, remedy=remedy)
-    return RawTable(
-        source,
-        columns,
-        np.arange(len(frames)),
-        labels={k: x[0] for k, x in texts.items() if len(x) == len(frames) and len({*x}) == 1},
-        groups={name: tuple(paths) for name, paths in groups.items() if paths != [name]},
-        text={path: found[0][:40] for path, found in texts.items() if path not in columns},
-        notes=notes,
-    )
-
-
-def _cells(value: Any, path: str, depth: int) -> Iterator[tuple[str, str, Any]]:
-    """Yield (path, group, value) of every number and text of a frame.
-
-    Lists within an object of a list are left out, unless a list of texts, as long and without
-    duplicates, names their numbers: values[effort] of ROS 2's DynamicJointState.
-    """
-    if isinstance(value, dict):
-        for key, item in value.items() if depth else ():
-            yield from _cells(item, f"{path}.{key}".lstrip("."), depth - 1)
-    elif not isinstance(value, list):
-        yield path, path, value
-    else:
-        for k, item in enumerate(value):
-            if isinstance(item, dict):
-                for inner, cell in flatten(_by_names(item), f"{path}[{k}]"):
-                    if not isinstance(cell, list):
-                        yield inner, inner, cell
-            elif not isinstance(item, list):
-                yield f"{path}[{k}]", path, item
-
-
-def _by_names(item: dict[str, Any]) -> dict[str, Any]:
-    """Return an object without its lists, or with a key for each number that one of them names."""
-    rest = {key: value for key, value in item.items() if not isinstance(value, list)}
-    lists = [(key, value) for key, value in item.items() if isinstance(value, list)]
-    lists.sort(key=lambda pair: not all(isinstance(x, str) for x in pair[1]))
-    if len(lists[1:]) == 1:
-        (_, texts), (key, numbers) = lists
-        if all(isinstance(x, str) for x in texts) and len(set(texts)) == len(texts) == len(numbers):
-            return rest | {f"{key}[{x}]": y for x, y in zip(texts, numbers, strict=True)}
-    return rest
-
-
-def read_yaml(data: bytes, source: str) -> RawTable | None:
-    """Return the table of YAML documents of mappings and lists of scalars; None of other text."""
-    first = re.match(rb"(---\r?\n)?[A-Za-z_]\w*:( \S.*)?\r?\n", data[:300])
-    if first is None or data.count(b"\n---") <= 1:
-        return None
-    frames: list[dict[str, Any]] = []
-    for part in re.split(r"(?m)^---\s*$", data.decode("utf-8", "replace")):
-        frames.append({})
-        path, holder, name = [(-1, frames[-1])], frames[-1], ""  # of the last key
-        for line in part.splitlines():
-            found = re.fullmatch(r"( *)(?:(- )\s*(.*)|([\w/.]+):(?: (.*))?)", line)
-            if found is None:
-                continue
-            value = ((found[3] if found[2] else found[5]) or "").strip()
-            scalar = float(value) if _NUMBER.fullmatch(value) else value.strip("'\"")
-            if found[2]:
-                if not isinstance(holder.get(name), list):
-                    holder[name] = []
-                holder[name].append(scalar)
-                continue
-            while path[-1][0] >= len(found[1]):
-                path.pop()
-            holder, name = path[-1][1], found[4]
-            holder[name] = scalar if value else {}
-            if not value:
-                path.append((len(found[1]), holder[name]))
-    return _table_of_frames([frame for frame in frames if frame], source)
+    found: dict[str, Any] = {}
+    for path, values in series.items():
+        first = next((value for value in values if value is not None), "")
+        width = len(first) if isinstance(first, list) else 1
+        texts = isinstance(first, str) or (
+            width and isinstance(first, list) and isinstance(first[0], str)
+        )
+        if texts or not width:
+            found[path] = " ".join(first) if isinstance(first, list) else first
+            continue
+        try:
+            rows = [[np.nan] * width if value is None else np.atleast_1d(value) for value in values]
+            array = np.array(rows, dtype=np.float64)
+            listed = isinstance(first, list) and width <= ARRAYS.widest
+            parts = {f"{path}[{k}]": column for k, column in enumerate(array.T)}
+            found |= parts if listed else {path: array}
+        except (ValueError, TypeError, OverflowError):
+            found[path] = np.empty(0, object)
+    return found

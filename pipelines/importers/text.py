@@ -1,54 +1,74 @@
-"""Read a recorded text file: its format is detected, its damage is counted, no line is guessed.
+"""Read a recorded text file: its format is detected, its damage is counted, no number is guessed.
 
+The delimiter and decimal sign are those under which most cells are numbers. A line is data where
+every column that holds numbers further down holds one in it, too; the names are in the nearest line
+of words above the first such line, comments included, and units may have a line of their own.
 A line with the wrong number of cells, or with a cell that is no number, is left out and named, as
 long as such lines are few (F09); the last line of a file that does not end in a line end is left
-out, because its last number may be cut. A few lines of text between the rows are messages, left out
-and named. Spreadsheet errors and formulas are refused: the numbers around them are not a recording.
+out, because its last number may be cut. pandas reads the lines that are whole.
 """
 
 from __future__ import annotations
 
 import codecs
+import csv
 import io
 import re
-from collections.abc import Container, Mapping
-from dataclasses import replace
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from pipelines.errors import Check, InputRejected, clean
-from pipelines.importers.config import TEXT
-from pipelines.importers.header import (
-    FORMULA,
-    MISSING,
-    WITH_UNIT,
-    Dialect,
-    Header,
-    Line,
-    cells_of,
-    find_dialect,
-    find_header,
-    is_number,
-    labelled_lines,
-    names_and_units,
-)
-from pipelines.importers.names import vocabulary, words_of
-from pipelines.importers.raw import RawTable
+from pipelines.importers.config import ARRAYS, TEXT
+from pipelines.importers.raw import RawTable, names_and_units
 from pipelines.importers.recipe import TextFormat
-from pipelines.io.limits import FEWEST
 from pipelines.io.log import Array
 from pipelines.io.units import UNITS, canonical_unit
 
-# Encodings of a file without a mark; the first where none fits better.
-_ENCODINGS = ("latin-1", "cp932", "gb18030", "cp949", "cp1250", "cp1251")
+Line = tuple[int, str]  # its number, from 1, and text
+
+MISSING = frozenset({"", "nan", "NaN", "NAN", "NA", "N/A", "null", "NULL", "None", "missing",
+                     "-nan", "-NaN", "-", "1.#IND", "-1.#IND", "1.#QNAN", "-1.#QNAN"})  # fmt: skip
+_SHEET_ERROR = r"#(?:REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)\b[!?]?"
+_FORMULA = re.compile(rf"\s*(?:{_SHEET_ERROR}|=.+|@.+)\s*")
+_NUMBER = re.compile(r"(?i:[+-]?((\d++\.?\d*|\.\d++)([ed][+-]?\d+)?|inf|infinity))")
 _MARKS = (codecs.BOM_UTF8, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-# A cell such as "#REF!" at the start of a line is damage, not a comment.
-_SHEET_ERROR = re.compile(r"\s*#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)\b")
-_GROUPED = re.compile(r"[-+.\d\seEnaNif]*[\[(][-+.\d\seEnaNif()\[\]]*")  # "12 (0.1 0.2) (3 4)"
-_TIME_OF_DAY = re.compile(
-    r"(?<!\d)(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,:;](\d{1,9}))?(?:\s?([AaPp])\.?[Mm]\b)?"
-)
-_USUAL = (Dialect(",", ".", 0), Dialect("\t", ".", 0), Dialect("", ".", 0))
+_DELIMITERS = {
+    ",": "comma",
+    ";": "semicolon",
+    "\t": "tab",
+    "|": "bar",
+    " ": "blanks",
+    "": "one column",
+}
+_NOWHERE = "\x1f"  # a delimiter that no text has
+_TIME_OF_DAY = re.compile(r"(?<!\d)(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,](\d{1,9}))?")
+_DAY = 86400.0  # numerics: seconds
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """Delimiter ("" one column, " " any blanks), decimal sign, and cells of a line."""
+
+    delimiter: str
+    decimal: str
+    width: int
+
+    def cells(self, line: str) -> list[str]:
+        """Return the cells of a line without blanks and quotes around them."""
+        if self.delimiter == "":
+            return [line.strip().strip('"')]
+        if '"' in line:
+            line = re.sub(r"\s+", " ", line.strip()) if self.delimiter == " " else line
+            return [cell.strip() for cell in next(csv.reader([line], delimiter=self.delimiter), [])]
+        return [cell.strip() for cell in line.split(self.delimiter.strip(" ") or None)]
+
+    def is_number(self, cell: str) -> bool:
+        point = cell.replace(",", ".") if self.decimal == "," and "." not in cell else cell
+        return _NUMBER.fullmatch(point) is not None or cell in MISSING
 
 
 def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawTable:
@@ -57,77 +77,58 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
     Raises:
         InputRejected: F01 nothing in it, F09 too much damage, F16 no table, S03 two equal names.
     """
-    detect = given in (None, TextFormat())
     given = given or TextFormat()
     text, checks = _decode(data, source, given.encoding)
-    if '"[' in text and detect:  # numpy breaks the lines of an array within its cell
-        text = re.sub(r'"\[[^"]*\]"', lambda cell: cell[0].replace("\n", " "), text)
-    lines = _lines(text, (given.comment,) if given.comment else ("#", "%", "//"))
+    if '"[' in text:  # numpy breaks the lines of an array within its cell
+        text = re.sub(r'"\[[^"\]]*\]"', lambda cell: cell[0].replace("\n", " "), text)
+    every = list(enumerate(text.split("\n"), start=1))
+    marks = (given.comment,) if given.comment else ("#", "%", "//")
+    lines = [
+        (number, line)
+        for number, line in every
+        if line.strip()
+        and (not line.lstrip().startswith(marks) or re.match(rf"\s*{_SHEET_ERROR}", line))
+    ]
     if not lines:
         remedy = "record again, or copy the file again"
         raise InputRejected("F01", "no line of numbers in the file", where=source, remedy=remedy)
-    if detect and (labelled := labelled_lines(lines)) is not None:
-        names, rows = labelled
-        if len(rows) < len(lines):
-            message = f"{len(lines) - len(rows)} lines without the numbers of the others left out"
-            remedy = "none where these are notes"
-            checks.append(Check.of("F09", "warn", message, where=source, remedy=remedy))
-        body = [(number, "\t".join(row)) for number, row in rows]
-        table, wrong = _columns(body, Dialect("\t", ".", len(names)), names, source)
-        notes = tuple(text.split("\n", rows[0][0])[: rows[0][0] - 1][-TEXT.most_notes :])
-        return replace(_without(table, wrong), notes=notes, groups={}, checks=tuple(checks))
-    if detect and all(_GROUPED.fullmatch(line) for _, line in lines):
-        lines = [(number, re.sub(r"[()\[\]]", " ", line)) for number, line in lines]
-    dialect = find_dialect(lines, source, given)
-    if dialect.width > TEXT.widest:
-        message = f"{dialect.width} cells in a line, {dialect.words}: not a table of columns"
-        remedy = "give delimiter and decimal under [format], or one row a sample"
-        raise InputRejected("F16", message, where=source, remedy=remedy)
-    if replace(dialect, width=0) not in _USUAL and given.delimiter is None:
-        message, remedy = f"read as: {dialect.words}", "say so under [format] to be sure"
-        checks.append(Check.of("F16", "warn", message, where=source, remedy=remedy))
-    long = dialect.width >= max(TEXT.long_side * len(lines), FEWEST) and given.header is None
-    if long and (turned := _transposed(lines, dialect, source, checks)) is not None:
-        return turned
-    header = find_header(lines, text, dialect, source, given.header)
-    body = _body(lines, header, text, dialect, source, checks)
-    table = _undamaged(body, text.endswith("\n"), dialect, header.names, source, checks)
-    columns = _without_repeats(table.columns, header, source)
-    # Every line ends in a delimiter:
-    empty = [n for n, v in columns.items() if n.startswith("column_") and np.isnan(v).all()]
-    above = list(enumerate(text.split("\n", body[0][0])[: body[0][0] - 1], start=1))
-    # Counted over lines of data: an empty line or a comment between them loses no sample.
-    lines_kept = np.array([]) if table.lines is None else table.lines
-    rows_kept = np.searchsorted(np.array([n for n, _ in body]), lines_kept)
+    dialect = _dialect(lines, source, given)
+    if dialect.width >= max(TEXT.long_side * len(lines), TEXT.fewest_long) and given.header is None:
+        return _along_the_lines(lines, dialect, source)
+    names, units, body, header = _header(lines, every, dialect, source, given.header)
+    if len(set(names)) < len(names):
+        first = next(name for k, name in enumerate(names) if name in names[:k])
+        at = ", ".join(str(k) for k, name in enumerate(names, start=1) if name == first)
+        message, where = f"columns {at} are all named '{first[:80]}'", f"{source}, line {header}"
+        remedy = "give each its own name in the file"
+        raise InputRejected("S03", message, where=where, remedy=remedy)
+    if not body:
+        raise InputRejected("T08", "a header, but no sample", where=source, remedy="record again")
+    table = _whole_lines(body, text.endswith("\n"), dialect, names, source)
+    above = [line.strip("#%/ ,;\t") for number, line in every[: body[0][0] - 1] if number != header]
+    kept = {name: x for name, x in table.columns.items()
+            if not (name.startswith("column_") and np.isnan(x).all())}  # fmt: skip
+    if not kept:
+        remedy = "rrrid import reads CSV and text tables, MAT (v5, v7.3) and NPY"
+        raise InputRejected("F16", "no column of numbers", where=source, remedy=remedy)
     return replace(
         table,
-        columns={name: values for name, values in columns.items() if name not in empty},
-        rows=rows_kept,
-        units={**header.units, **table.units},
-        notes=tuple(line for number, line in above[-TEXT.most_notes :] if number != header.line),
-        breaks=tuple(int(i) + 1 for i in np.flatnonzero(np.diff(rows_kept) > 1)),
-        checks=tuple(checks),
+        columns=kept,
+        units={**units, **table.units},
+        notes=tuple(note for note in above if note)[-ARRAYS.most_notes :],
+        checks=(*checks, *_unusual(dialect, given, lines, body, header, source), *table.checks),
     )
 
 
-def _lines(text: str, marks: tuple[str, ...]) -> list[Line]:
-    """Return all lines that are neither empty nor a comment."""
-    return [
-        (number, line)
-        for number, line in enumerate(text.split("\n"), start=1)
-        if line.strip() and (not line.lstrip().startswith(marks) or _SHEET_ERROR.match(line))
-    ]
-
-
 def _decode(data: bytes, source: str, encoding: str | None) -> tuple[str, list[Check]]:
-    """F16: return the text of the file, by its byte order mark, its NUL bytes or its words.
+    """F16: return the text of the file, by its byte order mark or its NUL bytes, else UTF-8.
 
     Raises:
         InputRejected: F16, NUL bytes inside, or not the encoding it claims.
     """
     checks: list[Check] = []
     if encoding is None:
-        encoding = _encoding_of(data)
+        encoding = _encoding_of(data, source)
         if encoding != "utf-8":
             mark = " (byte order mark)" if data.startswith(_MARKS) else ""
             remedy = "give encoding under [format] if that is wrong"
@@ -153,7 +154,7 @@ def _decode(data: bytes, source: str, encoding: str | None) -> tuple[str, list[C
     return text.replace("\r\n", "\n").replace("\r", "\n"), checks
 
 
-def _encoding_of(data: bytes) -> str:
+def _encoding_of(data: bytes, source: str) -> str:
     if data.startswith(_MARKS):
         return "utf-8-sig" if data.startswith(codecs.BOM_UTF8) else "utf-16"
     head = data[: TEXT.head_bytes]
@@ -163,112 +164,189 @@ def _encoding_of(data: bytes) -> str:
             return encoding
     try:
         data.decode("utf-8")
-    except UnicodeDecodeError:  # by how many words that name columns it has
-        words = {e: words_of(head.decode(e, "ignore")) for e in _ENCODINGS}
-        known = vocabulary().every
-        return max(_ENCODINGS, key=lambda e: sum(word in known for word in words[e]))
+    except UnicodeDecodeError:  # accents come alone, letters of other alphabets side by side
+        side_by_side = b"".join(re.findall(rb"[\x80-\xff]{2,}", head))
+        if 2 * len(side_by_side) <= len(re.findall(rb"[\x80-\xff]", head)):
+            return "latin-1"
+        message, remedy = (
+            "text in an unknown encoding",
+            "save it as UTF-8, or give [format] encoding",
+        )
+        raise InputRejected("F16", message, where=source, remedy=remedy) from None
     return "utf-8"
 
 
-def _body(
-    lines: list[Line], header: Header, text: str, dialect: Dialect, source: str, checks: list[Check]
-) -> list[Line]:
-    """Return the lines of data, without headers that come again and messages of the recorder.
-
-    A message has words and not the cells of a row. It neither begins nor ends with a number, as the
-    rows do: what does so is a damaged row.
+def _dialect(lines: list[Line], source: str, given: TextFormat) -> Dialect:
+    """F16: return the format in which most cells are numbers and all lines have one width.
 
     Raises:
-        InputRejected: T08 no sample, F16 a further table.
+        InputRejected: F16, the decimal comma is not distinguishable from the delimiter.
     """
-    body = lines[header.first :]
-    if header.skipped:
-        message = f"{header.skipped} lines before the table left out"
-        remedy = "give header or comment under [format] if these are data"
-        where = f"{source}, line {lines[0][0]}"
-        checks.append(Check.of("F16", "warn", message, where=where, remedy=remedy))
-    head = text.split("\n", header.line)[header.line - 1] if header.line else ""
-    if again := [number for number, line in body if head and line == head]:
-        body = [line for line in body if line[1] != head]
-        message = f"the header comes again in {len(again)} lines, left out: the recorder was"
-        where, remedy = f"{source}, line {again[0]}", "none where the clock goes on"
-        check = Check.of("F16", "warn", f"{message} started again", where=where, remedy=remedy)
-        checks.append(check)
-    if not body:
-        raise InputRejected("T08", "a header, but no sample", where=source, remedy="record again")
-
-    def numeric(cell: str) -> bool:
-        return is_number(cell, dialect.decimal) or cell in MISSING
-
-    row = cells_of(body[0][1], dialect.delimiter)
-    said: list[Line] = []
-    for number, line in body:
-        first = line.split(dialect.delimiter.strip(" ") or None, 1)[0].strip()
-        if numeric(first) or not re.search(r"[^\W\d_]", line):
-            continue
-        cells = cells_of(line, dialect.delimiter)
-        _refuse_further_table(cells, number, dialect, text, body[0][0], source)
-        ends = numeric(cells[0]) or numeric(cells[-1]) or any(map(FORMULA.fullmatch, cells))
-        if len(cells) != dialect.width and not ends and re.search(r"[^\W\d_]{3}", line):
-            said.append((number, line))
-    of_numbers = numeric(row[0]) and numeric(row[-1])
-    if not said or not of_numbers or len(said) > TEXT.most_messages * len(body):
-        return body
-    words = f"{len(said)} lines of text between the rows left out"
-    words += f", the first is line {said[0][0]}: '{clean(said[0][1], 60)}'"
-    remedy = "none where these are messages of the recorder"
-    checks.append(Check.of("F09", "warn", words, where=source, remedy=remedy))
-    left_out = {number for number, _ in said}
-    return [line for line in body if line[0] not in left_out]
+    step = max(1, len(lines) // TEXT.sampled)
+    sample = [line for _, line in lines[len(lines) > 1 :: step]]
+    delimiters = tuple(_DELIMITERS) if given.delimiter is None else (given.delimiter,)
+    decimals = (".", ",") if any("," in line for line in sample) else (".",)
+    decimals = (given.decimal,) if given.decimal else decimals
+    pairs = [(a, b) for a in delimiters for b in decimals if a != b]
+    if not pairs:
+        remedy = "give delimiter and decimal under [format]"
+        raise InputRejected("F16", "no delimiter fits", where=source, remedy=remedy)
+    scored = []
+    for delimiter, decimal in pairs:
+        form = Dialect(delimiter, decimal, 0)
+        split = [form.cells(line) for line in sample]
+        width = Counter(map(len, split)).most_common(1)[0][0]
+        numeric = sum(sum(map(form.is_number, row)) for row in split if len(row) == width)
+        head = form.cells(lines[0][1])
+        fits = len(head) == width or all(map(form.is_number, head))
+        share = round(numeric / (width * len(split)), TEXT.decimals)
+        scored.append(((share, fits, width, decimal == "."), replace(form, width=width)))
+    score, dialect = max(scored, key=lambda pair: pair[0])
+    names = len(dialect.cells(lines[0][1]))
+    if not score[1] and dialect.delimiter == "," and dialect.width == 2 * names and names > 1:
+        number = next(n for n, line in lines if line.count(",") + 1 == dialect.width)
+        cells = f"line {number} has {dialect.width} cells under {names} names"
+        message = f"{cells}: comma is both delimiter and decimal sign"
+        remedy = "export with a semicolon or tab between the columns, or with decimal points"
+        raise InputRejected("F16", message, where=source, remedy=remedy)
+    if dialect.width > TEXT.widest:
+        message = f"{dialect.width} cells in a line: not a table of columns"
+        remedy = "give delimiter and decimal under [format], or one row a sample"
+        raise InputRejected("F16", message, where=source, remedy=remedy)
+    return dialect
 
 
-def _refuse_further_table(
-    names: list[str], number: int, dialect: Dialect, text: str, first: int, source: str
-) -> None:
-    """F16: at a line of other names than those above line `first` another table begins."""
-    words = [name for name in names if name not in MISSING and not is_number(name)]
-    if not 1 < len(names) == len(words) == dialect.width < 2 * len(set(words)):
-        return
-    above = text.split("\n", first)[: first - 1]
-    if not names[0][:1].isalpha() or names in [cells_of(x, dialect.delimiter) for x in above]:
-        return  # the recorder was started again
-    message = f"a further table begins, of {', '.join(names[:3])[:60]} …"
-    where, remedy = f"{source}, line {number}", "save each table in a file of its own"
-    raise InputRejected("F16", message, where=where, remedy=remedy)
-
-
-def _undamaged(
-    body: list[Line],
-    whole: bool,
+def _unusual(
     dialect: Dialect,
-    names: tuple[str, ...],
+    given: TextFormat,
+    lines: list[Line],
+    body: list[Line],
+    header: int,
     source: str,
-    checks: list[Check],
+) -> list[Check]:
+    """F16: report a dialect that is not usual, and lines above the table that were left out."""
+    checks = []
+    usual = dialect.delimiter in (",", "\t", "") and dialect.decimal == "."
+    if not usual and given.delimiter is None:
+        sign = "comma" if dialect.decimal == "," else "point"
+        words = f"{_DELIMITERS.get(dialect.delimiter, dialect.delimiter)}, decimal {sign}"
+        message, remedy = f"read as: {words}", "say so under [format] to be sure"
+        checks.append(Check.of("F16", "warn", message, where=source, remedy=remedy))
+    skipped = [number for number, _ in lines if number < body[0][0] and number < header]
+    if skipped:
+        message = f"{len(skipped)} lines before the table left out"
+        remedy, where = "give header or comment under [format]", f"{source}, line {skipped[0]}"
+        checks.append(Check.of("F16", "warn", message, where=where, remedy=f"{remedy} if not so"))
+    return checks
+
+
+def _header(
+    lines: list[Line], every: list[Line], dialect: Dialect, source: str, has_header: bool | None
+) -> tuple[list[str], dict[str, str], list[Line], int]:
+    """Return names and units of the columns, the lines of data, and the number of the names' line.
+
+    Raises:
+        InputRejected: F16, one name more or less than columns.
+    """
+    width = dialect.width
+    numbered = [f"column_{j + 1}" for j in range(width)]
+    if has_header is False:
+        return numbered, {}, lines, 0
+    rows = [(k, dialect.cells(line)) for k, (_, line) in enumerate(lines[: 2 * TEXT.head])]
+    table = [(k, row) for k, row in rows if len(row) == width]
+    later = [row for _, row in table[2:]] or [row for _, row in table[1:]] or [r for _, r in table]
+    numeric = [
+        j for j in range(width)
+        if sum(map(dialect.is_number, (row[j] for row in later))) > TEXT.numeric * len(later)
+        and any(row[j] not in MISSING for row in later)
+    ]  # fmt: skip
+    counted = [str(k) for k in range(len(numeric))]  # 0, 1, 2, … are names
+    data = [k for k, row in table if numeric and all(dialect.is_number(row[j]) for j in numeric)]
+    if len(data) > 1 and len(counted) >= TEXT.fewest_counted:
+        data = data[1:] if [rows[data[0]][1][j] for j in numeric] == counted else data
+    first = data[0] if data else min(1, len(lines))
+    number = lines[first][0] if first < len(lines) else every[-1][0] + 1
+    plain = {n for n, _ in lines}
+    units: list[str] = []
+    best: tuple[int, list[str], int] | None = None  # different names, names, line
+    for n, line in reversed(
+        [pair for pair in every[: number - 1] if pair[1].strip()][-TEXT.head :]
+    ):
+        bare = line if n in plain else line.lstrip().lstrip("#%/*! ")
+        cells = _fitted(bare, dialect, later)
+        if cells is None:
+            split = len(dialect.cells(line))
+            if n in plain and abs(split - width) == 1 and not (units or best) and split > 1:
+                message, where = f"{split} names above {width} columns", f"{source}, line {n}"
+                remedy = "correct the header, or give [format] header = false and columns by number"
+                raise InputRejected("F16", message, where=where, remedy=remedy)
+            continue
+        said = [cell.strip("[]() ") for cell in cells]
+        known = [c for c in said if c not in ("", "-", "1")]
+        of_units = sum(canonical_unit(c) in UNITS or c == "counts" for c in known)
+        names = [cells[j] for j in numeric]
+        words = any(name and not dialect.is_number(name) for name in names)
+        if not units and 2 * of_units > len(known):
+            units = said
+        elif (words or names == counted) and (best is None or len(set(names)) > best[0]):
+            best = (len(set(names)), cells, n)
+    if best is None:
+        return numbered, {}, lines[first:], 0
+    columns, found = names_and_units(best[1])
+    pairs = zip(columns, units, strict=True) if units else ()
+    found |= {name: unit for name, unit in pairs if unit not in ("", "-", "1")}
+    return columns, found, lines[first:], best[2]
+
+
+def _fitted(line: str, dialect: Dialect, rows: Sequence[Sequence[str]]) -> list[str] | None:
+    """Return one cell a column of a line above the table, or None.
+
+    Rows that end in a delimiter have an unnamed, empty last cell; a table with numbered rows (R,
+    pandas) has an unnamed first column. Comments may have another delimiter than the table.
+    """
+    for delimiter in dict.fromkeys((dialect.delimiter, ",", ";", "\t", " ", "|")):
+        cells = replace(dialect, delimiter=delimiter).cells(line.strip())
+        cells = [cell.strip(" ,;\t") for cell in cells]
+        if len(cells) == dialect.width:
+            return cells
+        if len(cells) == dialect.width - 1 and cells:
+            if all(row[-1] in MISSING for row in rows):
+                return [*cells, ""]
+            if all(row[0].isdecimal() for row in rows) and delimiter == dialect.delimiter:
+                return ["row", *cells]
+        if len(cells) == dialect.width + 1 and not cells[-1]:
+            return cells[:-1]
+    return None
+
+
+def _whole_lines(
+    body: list[Line], ended: bool, dialect: Dialect, names: list[str], source: str
 ) -> RawTable:
     """F09: return the undamaged lines; little damage is left out and named."""
     damage: dict[int, str] = {}  # by index in the body
+    delimiter = dialect.delimiter.strip(" ")
     for i, (number, line) in enumerate(body):
-        simple = dialect.delimiter not in ("", " ") and '"' not in line
-        cells = [] if simple else cells_of(line, dialect.delimiter)
-        count = len(cells) or line.count(dialect.delimiter) + 1
-        if count != dialect.width:
-            for name, cell in zip(names, cells_of(line, dialect.delimiter), strict=False):
-                _refuse_formula(cell, name, number, source)
+        simple = delimiter and '"' not in line
+        cells = [] if simple else dialect.cells(line)
+        count = line.count(delimiter) + 1 if simple else len(cells)
+        if count != dialect.width or line.count('"') % 2:
+            for cell in dialect.cells(line):
+                _refuse_formula(cell, "?", number, source)
             damage[i] = f"{count} cells, not {dialect.width}"
-    torn = set(damage)
-    if not whole and len(body) - 1 not in torn:
+    checks, torn = [], set(damage)
+    if not ended and len(body) - 1 not in torn:
         torn.add(len(body) - 1)
-        message = "the last line has no line end: whether its last number is whole is not known"
-        where = f"{source}, line {body[-1][0]}"
-        remedy = "end the recording before the file is copied"
-        message += ", it is left out"
-        checks.append(Check.of("F09", "warn", message, where=where, remedy=remedy))
+        message = "the last line has no line end: whether its last number is whole is not known, "
+        where, remedy = f"{source}, line {body[-1][0]}", "end the recording before it is copied"
+        checks.append(
+            Check.of("F09", "warn", f"{message}it is left out", where=where, remedy=remedy)
+        )
     good = [i for i in range(len(body)) if i not in torn]
     if not good:
         remedy = "record again, or copy the file again"
         raise InputRejected("T08", "no whole line of numbers", where=source, remedy=remedy)
     table, wrong = _columns([body[i] for i in good], dialect, names, source)
-    damage |= {good[i]: reason for i, reason in wrong.items()}
+    damage |= {good[k]: reason for k, reason in wrong.items()}
     if damage:
         first = sorted(damage)[: TEXT.most_damaged]
         listed = ", ".join(f"line {body[i][0]} ({damage[i]})" for i in first)
@@ -278,183 +356,100 @@ def _undamaged(
             message = f"{share} are out of step with the columns: {listed}"
             remedy = "export the file again, or cut the damaged part out"
             raise InputRejected("F09", message, where=source, remedy=remedy)
-        message = f"{share} left out: {listed}"
         remedy = "copy or export the file again to have them all"
+        message = f"{share} left out: {listed}"
         checks.append(Check.of("F09", "repair", message, where=source, remedy=remedy))
-    return _without(table, wrong)
-
-
-def _without(table: RawTable, wrong: Container[int]) -> RawTable:
-    """Return the table without some samples, by index."""
-    keep = [k for k in range(table.rows.size) if k not in wrong]
-    columns = {name: np.ascontiguousarray(x[keep]) for name, x in table.columns.items()}
-    lines = None if table.lines is None else table.lines[keep]
-    return replace(table, columns=columns, rows=np.arange(len(keep)), lines=lines)
+    keep = [k for k in range(len(good)) if k not in wrong]
+    rows = np.array([good[k] for k in keep], dtype=np.int64)
+    return replace(
+        table,
+        columns={name: np.ascontiguousarray(x[keep]) for name, x in table.columns.items()},
+        rows=rows,
+        lines=np.array([body[i][0] for i in rows], dtype=np.int64),
+        breaks=tuple(int(i) + 1 for i in np.flatnonzero(np.diff(rows) > 1)),
+        checks=tuple(checks),
+    )
 
 
 def _columns(
-    lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: str
+    lines: list[Line], dialect: Dialect, names: list[str], source: str
 ) -> tuple[RawTable, dict[int, str]]:
-    """Return the columns: all numbers at once, or cell by cell to find which is no number.
+    """Return the columns of whole lines, and those (by index) with a cell that is no number."""
+    import pandas as pd
 
-    Lines (by index) with a cell of another kind come with the reason.
-    """
-    # numpy rounds every number correctly; pandas does so in some versions only.
-    whole = "\n".join(line for _, line in lines)
-    whole = whole.replace(",", ".") if dialect.decimal == "," else whole
-    delimiter = dialect.delimiter.strip(" ") or None
-    try:
-        numbers = np.loadtxt(
-            io.StringIO(whole), comments=None, delimiter=delimiter, quotechar='"', ndmin=2
-        )
-    except (ValueError, OverflowError):
-        numbers = np.empty((0, 0))
-    groups: dict[str, list[str]] = {}  # "q_1", "q_2", … may be asked for together as "q"
-    for name in names:
-        stem = name.rstrip("0123456789")
-        if stem != name:
-            groups.setdefault(stem.removesuffix("_"), []).append(name)
-    at = np.array([number for number, _ in lines], dtype=np.int64)
-    together = {stem: tuple(members) for stem, members in groups.items()}
-    table = RawTable(source, {}, np.arange(len(lines)), groups=together, lines=at)
-    if numbers.shape == (len(lines), len(names)):
-        columns = dict(zip(names, np.ascontiguousarray(numbers.T), strict=True))
-        return replace(table, columns=columns), {}
-    rows = [cells_of(line, dialect.delimiter) for _, line in lines]
+    separator = {" ": r"\s+", "": _NOWHERE}.get(dialect.delimiter, dialect.delimiter)
+    frame = pd.read_csv(
+        io.StringIO("\n".join(line for _, line in lines)),
+        sep=separator, decimal=dialect.decimal, header=None, names=range(dialect.width),
+        index_col=False, na_values=sorted(MISSING), keep_default_na=False, skipinitialspace=True,
+        skip_blank_lines=False, low_memory=False,
+    )  # fmt: skip
+    columns, units, text = dict[str, Array](), dict[str, str](), dict[str, str]()
     wrong: dict[int, str] = {}
-    columns, words = dict[str, Array](), list[RawTable]()
-    for name, cells in zip(names, map(list, zip(*rows, strict=True)), strict=True):
-        number = [is_number(cell, dialect.decimal) for cell in cells]
-        bad = [i for i, c in enumerate(cells) if not number[i] and c not in MISSING]
-        for i in bad:
-            _refuse_formula(cells[i], name, lines[i][0], source)
-        if len(bad) > max(TEXT.most_damaged, len(cells) // 2) or (bad and len(bad) == len(cells)):
-            words.append(_words(table, name, cells, cells[bad[0]]))
-            columns |= words[-1].columns
+    for name, (_, cells) in zip(names, frame.items(), strict=True):
+        if cells.dtype.kind in "iuf":
+            columns[name] = cells.to_numpy(np.float64)
             continue
-        pairs = zip(cells, number, strict=True)
-        columns[name] = np.array([_value(c, dialect.decimal) if ok else np.nan for c, ok in pairs])
-        wrong |= {i: f"'{cells[i][:30]}' in column '{name}' is no number" for i in bad}
-    if not columns:
-        remedy = "rrrid import reads CSV and text tables, MAT (v5, v7.3) and NPY"
-        raise InputRejected("F16", "no column of numbers", where=source, remedy=remedy)
-    return replace(
-        table,
-        columns=columns,
-        units={name: unit for found in words for name, unit in found.units.items()},
-        text={name: text for found in words for name, text in found.text.items()},
-        labels={name: text for found in words for name, text in found.labels.items()},
-        cycles={name: cycle for found in words for name, cycle in found.cycles.items()},
-    ), wrong
-
-
-def _value(cell: str, decimal: str) -> float:
-    point = cell.replace(",", ".") if decimal == "," else cell
-    return float(cell if "inf" in cell.lower() else re.sub("[dD]", "e", point))
+        words = cells.astype("string").str.strip()
+        point = words.str.replace(",", ".") if dialect.decimal == "," else words
+        # Fortran writes 1D-3.
+        numbers = pd.to_numeric(point.str.replace(r"(?<=\d)[dD](?=[+-]?\d)", "e", regex=True),
+                                errors="coerce").to_numpy(np.float64, na_value=np.nan)  # fmt: skip
+        missing = words.isna().to_numpy() | words.isin(MISSING).to_numpy(bool, na_value=True)
+        bad = np.flatnonzero(np.isnan(numbers) & ~missing)
+        for i in bad:
+            _refuse_formula(words[i], name, lines[i][0], source)
+        if bad.size <= max(TEXT.most_damaged, len(lines) // 2) and bad.size < len(lines):
+            columns[name] = numbers
+            wrong |= {int(i): f"'{words[i][:30]}' in column '{name}' is no number" for i in bad}
+        elif (seconds := _clock_times(words)) is not None:
+            columns[name], units[name] = seconds, "s"
+        elif (lists := _lists(words)) is not None:
+            columns |= {f"{name}[{k}]": values for k, values in enumerate(lists.T)}
+        else:
+            text[name] = clean(words[int(bad[0])], ARRAYS.longest_text)
+    return RawTable(source, columns, np.arange(len(lines)), units, text), wrong
 
 
 def _refuse_formula(cell: str, column: str, line: int, source: str) -> None:
-    if FORMULA.fullmatch(cell):
+    if _FORMULA.fullmatch(cell):
         message = f"'{cell[:30]}' in column '{column}' is a spreadsheet's formula or error"
         remedy = "export the recording itself, not an edited sheet"
         raise InputRejected("F16", message, where=f"{source}, line {line}", remedy=remedy)
 
 
-def _words(table: RawTable, name: str, cells: list[str], example: str) -> RawTable:
-    """Return a table of one column alone, of times of the day, durations, arrays or text."""
-    if (seconds := _clock_times(cells)) is not None:
-        return replace(table, columns={name: seconds}, units={name: "s"})
-    # Numbers with one known unit behind them, as MATLAB writes a duration: "0.004 sec".
-    found = [m for cell in cells if (m := WITH_UNIT.fullmatch(cell)) is not None]
-    units = {canonical_unit(m[2]) for m in found}
-    if len(found) == len(cells) and len(units) == 1 and units <= UNITS.keys():
-        numbers = np.array([float(m[1]) for m in found])
-        return replace(table, columns={name: numbers}, units={name: units.pop()})
-    # Arrays, as Python and numpy write them.
-    arrays = all(cell[:1] + cell[-1:] in ("[]", "()") for cell in cells)
-    lists = [re.split(r"[\s,;]+", cell[1:-1].strip(" ,")) for cell in cells] if arrays else []
-    lengths = sorted({len(row) for row in lists})
-    if len(lengths) == 1 and all(is_number(number) for row in lists for number in row):
-        items = enumerate(np.array(lists, dtype=np.float64).T)
-        return replace(table, columns={f"{name}[{k}]": values for k, values in items})
-    example = example[: TEXT.longest_example]
-    if len(lengths) > 1:  # as of two publishers
-        example = f"arrays of {lengths[0]} to {lengths[-1]} items: keep the rows of one kind"
-    # After how many samples it repeats: after one, or after the joints of an arm.
-    most = min(TEXT.most_joints, len(cells) // 2)
-    period = next((k for k in range(1, most + 1) if cells[k:] == cells[:-k]), 0)
-    labels = {name: cells[0]} if period == 1 else {}
-    cycles = {name: tuple(cells[:period])} if period > 1 else {}
-    return replace(table, text={name: example}, labels=labels, cycles=cycles)
-
-
-def _clock_times(cells: list[str]) -> Array | None:
-    """Return seconds [s] of times such as "2024-05-17T11:30:00.125Z" or "1:30 PM", over midnight.
-
-    Hours that stay below 13 and start again after noon are of a clock of 12 hours.
-    """
-    found = [m for cell in cells if (m := _TIME_OF_DAY.search(cell)) is not None]
-    if len(found) < len(cells):
+def _clock_times(cells: Any) -> Array | None:
+    """Return seconds [s] of times such as "2024-05-17T11:30:00.125Z", counted on over midnight."""
+    found = [_TIME_OF_DAY.search(str(cell)) for cell in cells]
+    if None in found or any(re.search(r"(?i)\d\s?[ap]\.?m\b", str(cell)) for cell in cells):
         return None
-    halves = any(m[5] for m in found)
-    hours = np.array([int(m[1]) % 12 + 12 * (m[5] in "Pp") if m[5] else int(m[1]) for m in found])
-    minutes = [60.0 * int(m[2]) + float(f"{m[3]}.{m[4] or 0}") for m in found]
-    seconds = np.array(minutes) + 3600.0 * hours
-    day = 86400.0 if halves or (hours > TEXT.half_day).any() else 43200.0
-    again = np.diff(seconds) < -0.5 * day
-    return np.asarray(seconds + day * np.concatenate([[0.0], np.cumsum(again)]))
+    parts = [m.groups(default="0") for m in found if m is not None]
+    seconds = [3600.0 * int(h) + 60.0 * int(m) + float(f"{s}.{f}") for h, m, s, f in parts]
+    stamps = np.array(seconds)
+    again = np.diff(stamps) < -0.5 * _DAY
+    return np.asarray(stamps + _DAY * np.concatenate([[0.0], np.cumsum(again)]))
 
 
-def _without_repeats(columns: Mapping[str, Array], header: Header, source: str) -> dict[str, Array]:
-    """Return the columns without those that repeat one of the same name: a clock of each channel.
-
-    Raises:
-        InputRejected: S03, two columns of one name hold different numbers.
-    """
-    places: dict[str, list[int]] = {}
-    for name, first in header.again.items():
-        both = [columns[key] for key in (name, first) if key in columns]
-        if len(both) == 1 or not both or not np.array_equal(both[0], both[1], equal_nan=True):
-            at = places.setdefault(first, [header.names.index(first) + 1])
-            at.append(header.names.index(name) + 1)
-    if places:
-        pairs = [(", ".join(map(str, at)), name[:80]) for name, at in places.items()][:8]
-        message = "; ".join(f"columns {at} are all named '{name}'" for at, name in pairs)
-        where, remedy = f"{source}, line {header.line}", "give each its own name in the file"
-        raise InputRejected("S03", message, where=where, remedy=remedy)
-    return {name: values for name, values in columns.items() if name not in header.again}
-
-
-def _transposed(
-    lines: list[Line], dialect: Dialect, source: str, checks: list[Check]
-) -> RawTable | None:
-    """S11: read a table of few, long lines, one signal a line, perhaps behind its name and unit.
-
-    None where some line does not hold numbers from the same cell on.
-    """
-    rows = [cells_of(line, dialect.delimiter) for _, line in lines]
-    decimal = dialect.decimal
-    starts = (k for k in range(3) if all(len(r) > k and is_number(r[k], decimal) for r in rows))
-    begin = next(starts, None)
-    if begin is None:
+def _lists(cells: Any) -> Array | None:
+    """Return (samples, items) of cells that hold lists of one length: "[0.1, 0.2]"."""
+    rows = [re.split(r"[\s,;]+", str(cell).strip("[]() ,")) for cell in cells]
+    bracketed = all(str(cell)[:1] + str(cell)[-1:] in ("[]", "()") for cell in cells)
+    if not bracketed or len({len(row) for row in rows}) > 1:
         return None
-    for (number, _), row in zip(lines, rows, strict=True):
-        if abs(len(row) - dialect.width) > 1:
-            message, where = f"{len(row)} cells, not {dialect.width}", f"{source}, line {number}"
-            remedy = "export the file again, one line a sample"
-            raise InputRejected("F09", message, where=where, remedy=remedy)
-    labels = [row[0] if begin else f"line_{i}" for i, row in enumerate(rows, start=1)]
-    names, units, again = names_and_units(labels)
-    if begin > 1:
-        second = zip(names, (row[1].strip("[]() -") for row in rows), strict=True)
-        units |= {name: unit for name, unit in second if unit}
+    try:
+        return np.array(rows, dtype=np.float64)
+    except ValueError:
+        return None
+
+
+def _along_the_lines(lines: list[Line], dialect: Dialect, source: str) -> RawTable:
+    """S11: read a table of few, long lines, one signal a line, behind its name and perhaps unit."""
+    rows = [dialect.cells(line) for _, line in lines]
     length = min(len(row) - (not row[-1]) for row in rows)
-    cells = ("\t".join(row[k].replace(",", ".") for row in rows) for k in range(begin, length))
-    body = list(enumerate(cells, start=begin + 1))
-    table, _ = _columns(body, Dialect("\t", ".", len(rows)), names, source)
-    header = Header(names, units, again=again, line=lines[0][0])
-    columns = _without_repeats(table.columns, header, source)
-    message = f"{len(rows)} lines of {length - begin} numbers, read with time along the line"
+    turned = ("\t".join(column) for column in zip(*(row[:length] for row in rows), strict=True))
+    given = TextFormat(delimiter="\t", decimal=dialect.decimal)
+    table = read_text(("\n".join(turned) + "\n").encode(), source, given)
+    message = f"{len(rows)} lines of {length} cells, read with time along the line"
     remedy = "store one line a sample"
-    checks.append(Check.of("S11", "warn", message, where=source, remedy=remedy))
-    return replace(table, columns=columns, units=units, lines=None, checks=tuple(checks))
+    check = Check.of("S11", "warn", message, where=source, remedy=remedy)
+    return replace(table, lines=None, checks=(check, *table.checks))

@@ -1,4 +1,4 @@
-"""Convert recorded numbers into SI on the joint side, and a planned motion back.
+"""Convert recorded numbers into SI on the joint side.
 
 unwrap -> scale, sign -> unit -> torque constant -> transmission -> offset. With q_motor = N q_joint
 and tau_joint = Nᵀ tau_motor, the power q̇ᵀ tau is the same on both sides, sample by sample.
@@ -8,32 +8,25 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from pipelines.errors import Check, Gathering, InputRejected, UsageError
-from pipelines.importers.config import EVIDENCE, RECIPE
-from pipelines.importers.evidence import quarter_turns
+from pipelines.importers.config import RECIPE
 from pipelines.importers.names import MOTION, quantity_of
 from pipelines.importers.raw import RawTable
 from pipelines.importers.recipe import DriveSpec, Numbers, Recipe, SignalSpec
 from pipelines.importers.repair import Recording
 from pipelines.io import schema
 from pipelines.io.log import Array, Signal
-from pipelines.io.output import write_file
-from pipelines.io.parquet import csv_cell
 from pipelines.io.robot import Drive, RobotDescription
 from pipelines.io.units import UNITS, canonical_unit, to_si
 from pipelines.quality.subject import many
-from pipelines.quality.units import degrees_or_motor
 
 _LINEAR = frozenset({"m", "cm", "mm", "um", "m/s", "cm/s", "mm/s", "m/s^2", "mm/s^2", "N", "mN",
                      "kN"})  # fmt: skip
-_TURNS = {"deg": 360.0, "°": 360.0, "rad": 2.0 * math.pi, "mrad": 2000.0 * math.pi, "rev": 1.0,
-          "turn": 1.0}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +51,7 @@ def drive_of(spec: DriveSpec, robot: RobotDescription, where: object) -> Drive |
     if rows is not None:
         if len(rows) != n or any(isinstance(row, tuple) and len(row) != n for row in rows):
             message = f"drive.transmission must hold {n} gear ratios, or {n} rows of {n} numbers"
-            remedy = "write the gear ratio of each joint, or the whole matrix N of "
-            remedy += "q_motor = N q_joint"
+            remedy = "write the gear ratio of each joint, or the matrix N of q_motor = N q_joint"
             raise UsageError("C02", message, where=where, remedy=remedy)
         unit = np.eye(n)
         pairs = zip(rows, unit, strict=True)
@@ -86,6 +78,13 @@ def _per_joint(value: Numbers, n: int, what: str, where: object) -> Array:
     return np.broadcast_to(np.asarray(value, dtype=np.float64), (n,)).copy()
 
 
+def own_units(name: str, robot: RobotDescription) -> tuple[str, ...]:
+    """Return the SI unit of each joint; of an excitation without a law, that of acceleration."""
+    if schema.SIGNALS[name][0] == "excitation":
+        return (schema.unit_of(name),) * robot.n_joints
+    return tuple(schema.joint_unit(name, revolute) for revolute in robot.revolute)
+
+
 def unit_declared(
     name: str,
     spec: SignalSpec,
@@ -102,7 +101,7 @@ def unit_declared(
     where = f"{table.source}, signal {name}"
     headers = [table.units.get(column) for column in columns]
     if spec.unit is not None:
-        units, checks = _units_of_recipe(name, spec, robot, where)
+        units, checks = units_of_recipe(name, spec, robot, where)
         for header, unit in zip(headers, units, strict=True):
             known = UNITS.get(canonical_unit(header or "")), UNITS.get(canonical_unit(unit))
             if None not in known and known[0] != known[1]:
@@ -114,7 +113,7 @@ def unit_declared(
         message = f"unit '{', '.join(dict.fromkeys(given))}' taken from the header"
         units = tuple(header or given[0] for header in headers)
         return units, [Check.of("S06", "ok", message, where=where)]
-    wanted = _own_units(name, robot)
+    wanted = own_units(name, robot)
     if not assume:
         words = f'"{wanted[0]}"' if len(set(wanted)) == 1 else json.dumps(wanted)
         message = f"no unit; say what the numbers of {name} are in"
@@ -126,7 +125,7 @@ def unit_declared(
     return wanted, [Check.of("S04", "warn", message, where=where, remedy=remedy)]
 
 
-def _units_of_recipe(
+def units_of_recipe(
     name: str, spec: SignalSpec, robot: RobotDescription, where: object
 ) -> tuple[tuple[str, ...], list[Check]]:
     """Return the unit of each joint that the recipe declares.
@@ -144,7 +143,7 @@ def _units_of_recipe(
             raise UsageError("C02", message, where=where, remedy="one unit, or one a joint")
         return spec.unit, []
     unit = canonical_unit(spec.unit or "")
-    own = _own_units(name, robot)
+    own = own_units(name, robot)
     if spec.side == "motor" or len(set(own)) == 1 or unit != schema.unit_of(name):
         return (spec.unit or "",) * n, []
     joints = enumerate(zip(own, robot.joints, strict=True), start=1)
@@ -152,13 +151,6 @@ def _units_of_recipe(
     message = f"'{unit}' declared for turning and sliding joints: taken as SI, {other}"
     remedy = f"write unit = {json.dumps(own)} in signals.{name}"
     return own, [Check.of("S05", "warn", message, where=where, remedy=remedy)]
-
-
-def _own_units(name: str, robot: RobotDescription) -> tuple[str, ...]:
-    """Return the SI unit of each joint; of an excitation without a law, that of acceleration."""
-    if schema.SIGNALS[name][0] == "excitation":
-        return (schema.unit_of(name),) * robot.n_joints
-    return tuple(schema.joint_unit(name, revolute) for revolute in robot.revolute)
 
 
 def si_of(units: Sequence[str], spec: SignalSpec) -> float:
@@ -180,8 +172,8 @@ def joint_side(
     """Return all signals of a part in SI, joint side.
 
     Raises:
-        InputRejected: S05 unit of another quantity, S07 degrees declared as radians, S10 current
-            without constant.
+        InputRejected: S05 unit of another quantity, S07 mm declared as m, S10 current without
+            constant.
     """
     done, problems = Converted(), Gathering()
     n, where, controller = robot.n_joints, recipe.where, recipe.controller
@@ -204,22 +196,15 @@ def joint_side(
             unit = schema.unit_of(name, controller.law if controller else None)
             done.signals[name] = Signal(values + offset, unit, schema.SIGNALS[name][1])
     problems.raise_all()
-    if not trust_units and "q" in done.signals:
-        _refuse_degrees(part, done.signals["q"].values, units["q"], robot)
-    in_degrees = "q" in part.signals and set(units["q"]) <= {"deg", "°"}
-    if in_degrees and (starts := _starts(part.signals["q"])):
-        message = f"declared in degrees, but the numbers start at {starts}, digit by digit: "
-        message += "radians of the motor side?"
-        remedy = 'if so, declare unit = "rad" and add [drive] transmission = the gear ratios'
-        at = f"{part.where}, signal q"
-        done.checks.append(Check.of("S07", "warn", message, where=at, remedy=remedy))
+    for j, joint in enumerate(() if trust_units or "q" not in done.signals else robot.joints):
+        low, high = joint.position
+        span = float(np.ptp(done.signals["q"].values[:, j]))
+        if not joint.revolute and span > RECIPE.beyond * (high - low):
+            message = f"moves over {span:.4g} m, its limits are {low:.4g} to {high:.4g} m: looks "
+            remedy = 'declare unit = "mm" for this joint, one unit a joint'
+            where, message = part.column("q", j), f"{message}like mm"
+            raise InputRejected("S07", message, where=where, remedy=remedy)
     return done
-
-
-def _starts(q: Array) -> str:
-    """Return at which quarter turns positions start, in words; "" where they do not."""
-    turns = quarter_turns(q)
-    return f"{', '.join(map(str, turns.values()))} times pi/2" if turns else ""
 
 
 def _unwrapped(
@@ -237,17 +222,20 @@ def _unwrapped(
     """
     wrap = spec.wrap
     if wrap is None and len(set(units)) == 1 and schema.SIGNALS[name][0] == "position":
-        turn = _TURNS.get(units[0], math.inf)
+        known = UNITS.get(canonical_unit(units[0]))
+        turn = math.inf if known is None else 2.0 * math.pi / known.factor
         if units[0] == "counts" and isinstance(spec.counts_per_rev, int | float):
             turn = float(spec.counts_per_rev)
-        steps = np.abs(np.diff(raw, axis=0))
+        turn = math.inf if units[0] in _LINEAR else turn
+        steps, near = np.abs(np.diff(raw, axis=0)), RECIPE.turn_ratio * turn
         large = steps > 0.5 * turn
-        near = EVIDENCE.same_ratio * turn
         if large.any() and not large.all() and np.abs(steps[large] - turn).max() < near:
             wrap = turn if steps[~large].max() < near else None
-    if wrap is None:
+    turns = np.zeros((len(raw) - 1, raw.shape[1]))
+    if wrap is not None:
+        turns = np.round(np.diff(raw, axis=0) / wrap)
+    if wrap is None or not turns.any():
         return raw
-    turns = np.round(np.diff(raw, axis=0) / wrap)
     for joint in np.flatnonzero(turns.any(axis=0)):
         count = many(int(np.abs(turns[:, joint]).sum()), "rollover")
         rollovers = f"{count} of {wrap:g} unwrapped"
@@ -257,7 +245,7 @@ def _unwrapped(
         done.checks.append(Check.of("D07", "warn", message, where=where, remedy=remedy))
         done.altered.append(f"{name} of joint {joint + 1}: {rollovers}")
     zero = np.zeros((1, raw.shape[1]))
-    return raw - wrap * np.concatenate([zero, np.cumsum(turns, axis=0)]) if turns.any() else raw
+    return raw - wrap * np.concatenate([zero, np.cumsum(turns, axis=0)])
 
 
 def _in_si(
@@ -279,16 +267,14 @@ def _in_si(
         at = np.flatnonzero([other == unit for other in units])
         if unit in ("counts", "counts/s") and quantity in ("position", "velocity"):
             if spec.counts_per_rev is None:
-                remedy = f"add counts_per_rev to signals.{name}"
-                raise InputRejected(
-                    "S05", "counts without counts_per_rev", where=where, remedy=remedy
-                )
+                message, remedy = "counts without counts_per_rev", "add counts_per_rev to signals."
+                raise InputRejected("S05", message, where=where, remedy=f"{remedy}{name}")
             what = f"signals.{name}.counts_per_rev"
             turn = _per_joint(spec.counts_per_rev, len(units), what, recipe.where)
             rate = f"{spec.counts_per_rev} counts a revolution"
             done.steps.append(f"{name}: {unit} at {rate} to {own}")
             si[:, at] = values[:, at] * (2.0 * math.pi / turn[at])
-        elif quantity == "torque" and unit in UNITS and UNITS[unit].quantity == "current":
+        elif quantity == "torque" and quantity_of(unit) == "current":
             constants = drive.torque_constant if drive else None
             if constants is None:
                 message = f"{name} is recorded in {unit}, motor current instead of torque"
@@ -296,7 +282,7 @@ def _in_si(
                 raise InputRejected("S10", message, where=where, remedy=remedy)
             listed = ", ".join(f"{constants[j]:g}" for j in at)
             done.steps.append(f"{name}: {unit} times {listed} N m/A")
-            amperes = UNITS[unit].factor * values
+            amperes = UNITS[canonical_unit(unit)].factor * values
             si[:, at] = amperes[:, at] * np.array(constants)[at]
             if name == "tau" and at.size == len(units) and "current" not in recipe.signals:
                 done.signals["current"] = Signal(amperes, "A", schema.SIGNALS["current"][1])
@@ -344,7 +330,7 @@ def _refuse_wrong_kind(
     part: Recording, name: str, units: tuple[str, ...], robot: RobotDescription
 ) -> None:
     """S05: an angle for a joint that slides, a length for one that turns."""
-    own = _own_units(name, robot)
+    own = own_units(name, robot)
     for j, (unit, joint) in enumerate(zip(units, robot.joints, strict=True)):
         if quantity_of(unit) != "current" and joint.revolute == (unit in _LINEAR):
             each = f"one a joint: unit = {json.dumps(own)}"
@@ -352,104 +338,3 @@ def _refuse_wrong_kind(
             message = f"'{unit}' for joint {j + 1} '{joint.name}', which is {joint.type}"
             where, remedy = part.column(name, j), f"declare its unit, {wanted}"
             raise InputRejected("S05", message, where=where, remedy=remedy)
-
-
-def _refuse_degrees(
-    part: Recording, q: Array, units: tuple[str, ...], robot: RobotDescription
-) -> None:
-    """S07: refuse declared radians far beyond the joint's range: degrees, or the motor's side."""
-    for j, joint in enumerate(robot.joints):
-        low, high = joint.position
-        span, where = float(np.ptp(q[:, j])), part.column("q", j)
-        if units[j] not in ("rad", "m") or not (math.isfinite(low) and math.isfinite(high)):
-            continue
-        too_far = span > EVIDENCE.twice_room * (high - low)
-        unit = "rad" if joint.revolute else "m"
-        message = f"moves over {span:.4g} declared {unit}, its limits are {low:.4g} to {high:.4g}"
-        message += f" {unit}: "
-        if not joint.revolute and too_far:
-            remedy = 'declare unit = "mm" for this joint, one unit a joint'
-            raise InputRejected("S07", f"{message}looks like mm", where=where, remedy=remedy)
-        slack = EVIDENCE.limit_slack * (high - low)
-        angle = np.deg2rad(q[:, j])
-        degrees = bool(angle.min() >= low - slack and angle.max() <= high + slack)
-        if joint.revolute and span > 4.0 * math.pi and (degrees or too_far):
-            starts = _starts(q)
-            motor = (
-                f"; it starts at {starts}, as motors of such gear ratios do at rest"
-                if starts
-                else ""
-            )
-            message += f"looks like {'degrees or ' if degrees else ''}the motor side{motor}"
-            remedy = degrees_or_motor(span, (low, high))
-            raise InputRejected("S07", message, where=where, remedy=remedy)
-
-
-@dataclass(frozen=True, eq=False)
-class ControllerTable:
-    """Named columns for a controller."""
-
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    values: Array  # (samples, columns)
-    rate: float  # [Hz]
-
-
-def controller_table(
-    recipe: Recipe | None,
-    robot: RobotDescription,
-    motion: Callable[[Array], Array],
-    duration: float,
-    sample_time: float,
-) -> ControllerTable:
-    """Return positions as a robot's controller reads them: a recipe of `import`, run backwards.
-
-    In the recipe's order of columns, at its rate: importing the table by the recipe gives the
-    motion.
-
-    Args:
-        recipe: of the robot's recordings; None: joint side, SI, at `sample_time` [s].
-        motion: q (samples, joints) [rad] at times (samples,) [s].
-
-    Raises:
-        UsageError: C02, the recipe does not say how positions are recorded, or does not fit.
-    """
-    rate, n = 1.0 / sample_time, robot.n_joints
-    if recipe is not None:
-        rate = recipe.time.rate or 1.0 / (recipe.time.sample_time or sample_time)
-    t = np.arange(round(duration * rate) + 1) / rate
-    values = motion(t)
-    names, units = tuple(f"q_{j + 1}" for j in range(n)), _own_units("q", robot)
-    if recipe is not None:
-        spec = recipe.signals.get("q")
-        if spec is None:
-            message, remedy = "the recipe has no signal q", "give a recipe that imports positions"
-            raise UsageError("C02", message, where=recipe.where, remedy=remedy)
-        units = _units_of_recipe("q", spec, robot, recipe.where)[0] if spec.unit else units
-        # q = q_recorded A + b, of which zeros and a quarter of each unit vector show b and A.
-        probe = 0.25 * np.eye(n + 1, n, -1)
-        recorded = Recording(
-            probe[:, 0], {"q": probe}, {"q": names}, np.arange(n + 1), recipe.where
-        )
-        alone = replace(recipe, signals={"q": replace(spec, wrap=None)})
-        drive = drive_of(recipe.drive, robot, recipe.where)
-        q = joint_side(recorded, alone, {"q": units}, robot, drive, trust_units=True).signals["q"]
-        b, a = q.values[0], 4.0 * (q.values[1:] - q.values[0])
-        values = np.linalg.solve(a.T, (values - b).T).T
-        at = spec.where  # columns as the recipe calls them; numbered where it gives none by name
-        pattern = at if isinstance(at, str) and "{j}" in at else "q_{j}"
-        names = tuple(pattern.replace("{j}", str(j + 1)) for j in range(n))
-        if isinstance(at, tuple) and len(at) == n and all(isinstance(x, str) for x in at):
-            names = tuple(map(str, at))
-    return ControllerTable(("t", *names), ("s", *units), np.column_stack([t, values]), rate)
-
-
-def write_controller_table(path: Path, table: ControllerTable) -> None:
-    """Write CSV: one header line of names, each number with all its digits."""
-
-    def fill(draft: Path) -> None:
-        with draft.open("w", encoding="utf-8", newline="\n") as file:
-            file.write(",".join(map(csv_cell, table.names)) + "\n")
-            file.writelines(",".join(map(repr, row.tolist())) + "\n" for row in table.values)
-
-    write_file(path, fill)

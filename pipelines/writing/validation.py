@@ -23,7 +23,7 @@ from pipelines.errors import Check, RrridError
 from pipelines.estimation.filters import zero_phase
 from pipelines.estimation.motion import Reconstructed
 from pipelines.estimation.regression import condition
-from pipelines.importers.units import ControllerTable
+from pipelines.importers.controller import ControllerTable
 from pipelines.io.log import Array, ExperimentLog, recording
 from pipelines.io.output import slug
 from pipelines.io.results import NOT_STORED

@@ -15,7 +15,7 @@ import scipy.io
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.importers.npy import read_npy
-from pipelines.importers.raw import columns_of_arrays
+from pipelines.importers.raw import expand, table_of
 from pipelines.importers.tables import read_table
 from tests.importers.good import good, text
 
@@ -72,7 +72,7 @@ def test_an_array_of_structures_has_a_column_for_each_series_of_each_joint(tmp_p
 def test_a_structure_is_opened_one_level(tmp_path: Path) -> None:
     table = read_table(mat5(tmp_path / "run.mat", {"data": signals(), "note": "hello"}))
     assert np.array_equal(table.columns["data.q_2"], good()["q_2"])
-    assert table.groups["data.q"] == ("data.q_1", "data.q_2", "data.q_3")
+    assert expand(table, "data.q", 3, "q") == ("data.q_1", "data.q_2", "data.q_3")
 
 
 def test_mat73_is_read_exactly(tmp_path: Path) -> None:
@@ -110,19 +110,19 @@ def test_s12_complex_numbers_are_no_signal(tmp_path: Path) -> None:
 
 
 def test_s12_integers_beyond_the_mantissa_are_refused() -> None:
-    table = columns_of_arrays({"n": np.arange(50) + 2**60, "q": np.arange(50.0)}, "run.npy")
+    table = table_of({"n": np.arange(50) + 2**60, "q": np.arange(50.0)}, "run.npy")
     with pytest.raises(InputRejected, match="RRID-S12.*2\\^53"):
         table.name_of("n")
 
 
 def test_s11_a_matrix_that_lies_on_its_side_is_turned() -> None:
-    table = columns_of_arrays({"q": signals()["q"].T}, "run.npy")
+    table = table_of({"q": signals()["q"].T}, "run.npy")
     assert np.array_equal(table.columns["q_3"], good()["q_3"])
     assert [(c.code, c.level) for c in table.checks] == [("RRID-S11", "warn")]
 
 
 def test_s11_a_matrix_of_gains_beside_signals_is_no_signal() -> None:
-    table = columns_of_arrays({"q": signals()["q"], "gains": np.eye(3)}, "run.npy")
+    table = table_of({"q": signals()["q"], "gains": np.eye(3)}, "run.npy")
     assert list(table.columns) == ["q_1", "q_2", "q_3"]
 
 
@@ -150,7 +150,7 @@ def test_a_timeseries_of_vectors_is_a_matrix_and_cells_and_pictures_are_named(tm
 
 
 def test_s11_another_motion_in_the_same_file_is_named() -> None:
-    table = columns_of_arrays({"q": np.zeros((400, 2)), "tau": np.ones((400, 2)), "q_test": np.zeros((90, 2))}, "run.mat")
+    table = table_of({"q": np.zeros((400, 2)), "tau": np.ones((400, 2)), "q_test": np.zeros((90, 2))}, "run.mat")
     assert [check.message for check in table.checks] == ["left out, not of 400 samples: 'q_test'"]
 
 
@@ -173,7 +173,7 @@ def test_x12_an_npz_archive_is_read_and_one_of_other_files_is_not(tmp_path: Path
 
 def test_s11_a_square_matrix_is_refused() -> None:
     with pytest.raises(InputRejected, match="RRID-S11.*which side is time"):
-        columns_of_arrays({"q": np.zeros((20, 20))}, "run.npy")
+        table_of({"q": np.zeros((20, 20))}, "run.npy")
 
 
 def test_x01_an_external_link_is_refused(tmp_path: Path) -> None:
@@ -234,7 +234,7 @@ def test_npy_fields_are_read_by_name(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("order", ["C", "F"])
 def test_npy_columns_are_read_by_number(order: Any) -> None:
-    table = columns_of_arrays(read_npy(npy(np.asarray(signals()["q"], order=order)), "run.npy"), "run.npy")
+    table = table_of(read_npy(npy(np.asarray(signals()["q"], order=order)), "run.npy"), "run.npy")
     assert np.array_equal(table.columns[table.name_of(2)], good()["q_2"])
 
 
@@ -253,6 +253,6 @@ def test_x05_a_header_that_declares_too_much_is_refused() -> None:
 def test_the_samples_are_the_side_that_most_arrays_share() -> None:
     """A wide array of features beside short signals: 50 samples of them, not 512 of one row each."""
     rng = np.random.default_rng(1)
-    table = columns_of_arrays({"t": np.arange(50.0), "q": rng.normal(size=(50, 3)), "image": rng.normal(size=(50, 512))}, "run.npz")
+    table = table_of({"t": np.arange(50.0), "q": rng.normal(size=(50, 3)), "image": rng.normal(size=(50, 512))}, "run.npz")
     assert list(table.columns) == ["t", "q_1", "q_2", "q_3"]
     assert table.rows.size == 50

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipelines.errors import InputRejected
-from pipelines.importers.raw import RawTable, unstacked
+from pipelines.importers.raw import RawTable
 from pipelines.importers.text import read_text
 from tests.importers.good import good, lines, text
 
@@ -25,53 +25,6 @@ def levels(table: RawTable) -> dict[str, str]:
 
 def equal(table: RawTable, rows: slice = slice(None)) -> bool:
     return all(np.array_equal(table.columns[name], values[rows]) for name, values in good().items())
-
-
-def test_quotes_are_taken_off_in_pairs() -> None:
-    """npTDMS names a column /'Motion'/'q'."""
-    table = parse("'t';/'Motion'/'q'\n" + "\n".join(f"{k};'{k / 7:.5f}'" for k in range(50)))
-    assert list(table.columns) == ["t", "/'Motion'/'q'"]
-
-
-def test_a_table_of_one_row_a_joint_becomes_one_of_one_row_a_sample() -> None:
-    columns = good()
-    rows = [(t, name, columns[f"q_{j}"][k]) for k, t in enumerate(columns["t"]) for j, name in enumerate("cab", start=1)]
-    table = unstacked(parse("t,joint,q\n" + "".join(f"{t:.17g},{name},{q:.17g}\n" for t, name, q in rows)))
-    assert np.array_equal(table.columns["t"], columns["t"])
-    assert np.array_equal(table.columns["q[a]"], columns["q_2"])
-
-
-@pytest.mark.parametrize(("start", "refused"), [(1.7e9, True), (0.0, False)])
-def test_s11_series_below_each_other_are_refused_and_runs_are_not(start: float, refused: bool) -> None:
-    """A date comes once; a clock that starts from zero may do so with each run."""
-    columns = good()
-    table = parse(text({"t": np.tile(start + columns["t"], 3), "q": np.concatenate([columns[f"q_{j}"] for j in (1, 2, 3)])}))
-    if not refused:
-        assert unstacked(table) is table
-        return
-    with pytest.raises(InputRejected, match="RRID-S11 run.csv, column 't', line 1202: the same times come 3 times"):
-        unstacked(table)
-
-
-def test_brackets_round_bare_numbers_lose_none_of_them() -> None:
-    """As yarpdatadumper writes lists, without a label."""
-    rows = np.column_stack(list(good().values()))
-    written = "".join(f"{t:.17g} ({' '.join(f'{x:.17g}' for x in q)}) 1\n" for t, *q in rows)
-    assert np.array_equal(np.column_stack(list(parse(written).columns.values()))[:, :-1], rows)
-
-
-def test_a_unit_behind_every_number_may_be_a_sign() -> None:
-    """As Grafana formats cells."""
-    columns = good()
-    rows = zip(columns["t"], columns["q_1"], strict=True)
-    table = parse("t,q\n" + "".join(f"{t:.17g},{q:.17f}°\n" for t, q in rows))
-    assert np.allclose(table.columns["q"], columns["q_1"])
-    assert table.units == {"q": "deg"}
-
-
-def test_a_counter_that_starts_again_in_one_motion_is_no_joint() -> None:
-    columns = good() | {"frame": np.arange(1200.0) % 4, "bit": np.arange(1200.0) % 2}
-    assert list(unstacked(parse(text(columns))).columns) == list(columns)
 
 
 def test_every_digit_of_a_plain_file_is_read() -> None:
@@ -193,29 +146,6 @@ def test_f09_much_damage_is_refused() -> None:
         rows[k] = rows[k].rsplit(",", 1)[0]
     with pytest.raises(InputRejected, match=r"RRID-F09.*30 of 1200 lines.*line 101 \(6 cells.*Export"):
         parse("\n".join(rows) + "\n")
-
-
-@pytest.mark.parametrize("sign", [",", " "])
-def test_f09_messages_between_the_rows_are_left_out_and_named(sign: str) -> None:
-    """No sample is lost by them; a row that a message tore is damaged as before, and many messages are refused."""
-    said = "[WARN] [1714744933.305000]: control loop missed its rate of 200 Hz"
-    rows = "\n".join(lines()).replace(",", sign).split("\n")
-    table = parse("\n".join([*rows[:100], said, *rows[100:700], said, *rows[700:]]) + "\n")
-    assert "2 lines of text between the rows left out, the first is line 101: '[WARN]" in table.checks[-1].message
-    assert table.rows.size == 1200
-    assert table.breaks == ()
-    torn = parse("\n".join([*rows[:100], rows[100][:30] + said, *rows[101:]]) + "\n")
-    assert torn.breaks == (99,)
-    with pytest.raises(InputRejected, match="RRID-F09"):
-        parse("\n".join(part for k, row in enumerate(rows) for part in (row, said)[: 1 + (k % 5 == 4)]) + "\n")
-
-
-def test_f16_a_further_table_below_the_first_is_refused_with_its_line() -> None:
-    """Its numbers would go on under the names of the first."""
-    rows = lines()
-    names = ",".join(f"other_{k}" for k in range(7))
-    with pytest.raises(InputRejected, match=r"RRID-F16.*line 602.*a further table begins, of other_0.*file of its own"):
-        parse("\n".join([*rows[:601], names, *rows[601:]]) + "\n")
 
 
 def test_cells_that_julia_left_missing_are_no_numbers() -> None:

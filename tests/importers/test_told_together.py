@@ -144,9 +144,3 @@ def test_a_draft_names_arrays_that_are_one_sample_short(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(TWO.urdf())
     np.savez(tmp_path / "solution.npz", xs=np.column_stack([moved.q, moved.dq]), us=moved.tau[1:], dt=0.005)
     assert "us (an array of shape (2399, 2), not of 2400 samples)" in guess_recipe(tmp_path / "solution.npz").text
-
-
-def test_a_draft_names_lists_of_two_publishers(tmp_path: Path) -> None:
-    rows = [f'{0.01 * k:.2f},"[0.1, {0.1 * k:.1f}]"\n{0.01 * k + 0.004:.3f},[0.3]\n' for k in range(300)]
-    (tmp_path / "run.csv").write_text("Time,position\n" + "".join(rows))
-    assert "position (arrays of 1 to 2 items: keep the rows of one kind)" in guess_recipe(tmp_path / "run.csv").text
