@@ -29,16 +29,18 @@ class LinkFit:
 
 def fit_links(model: TorqueModel, q: Array, t: Array, tau: Array) -> LinkFit | None:
     """Return the fit of `tau` by the links at positions `q` [rad]; None on an uneven clock."""
-    from scipy.signal import savgol_filter
-
     step = float(np.median(np.diff(t)))
     width = max(GUESS.cubic, round(GUESS.window / step)) | 1
     if len(t) < 2 * width or np.abs(np.diff(t) / step - 1.0).max() > GUESS.uneven:
         return None
-    q = np.unwrap(q, axis=0)
-    every = slice(width, -width, max(1, len(t) // GUESS.samples))
-    motion = [savgol_filter(q, width, 3, deriv=k, delta=step, axis=0)[every] for k in range(3)]
-    links, tau = model(*motion), savgol_filter(tau, width, 3, axis=0)[every]
+    # Local cubics in a window about each sample (Savitzky & Golay 1964): value and derivatives.
+    powers = np.vander(np.linspace(-1.0, 1.0, width), 4)[:, ::-1]
+    value, slope, curve, _ = np.linalg.pinv(powers)
+    every, reach = slice(None, None, max(1, len(t) // GUESS.samples)), width // 2 * step
+    windows = np.lib.stride_tricks.sliding_window_view
+    around = windows(np.unwrap(q, axis=0), width, axis=0)[every]
+    motion = around @ value, around @ slope / reach, around @ curve * 2.0 / reach**2
+    links, tau = model(*motion), windows(tau, width, axis=0)[every] @ value
     if not np.isfinite(links).all():
         return None
     gains, rest = [], np.empty_like(tau)
