@@ -15,7 +15,6 @@ from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.importers.guess import guess_recipe
 from pipelines.importers.recipe import parse_recipe
 from pipelines.io.files import find_logs, open_log
-from pipelines.io.robot_files import load_robot
 from tests.importers.good import RECIPE, good, run, text, write
 
 
@@ -97,12 +96,6 @@ def test_a_sliding_joint_in_millimetres_declared_as_metres_is_refused(shared: Pa
     write(tmp_path / "data", (folder / "arm.urdf").read_bytes(), "arm.urdf")
     with pytest.raises(InputRejected, match=r"RRID-S07.*column 'q_3'.*looks like mm"):
         run(tmp_path / "data", (folder / "r.toml").read_text())
-
-
-def test_a_recipe_given_as_robot_is_recognised(tmp_path: Path) -> None:
-    path = write(tmp_path, RECIPE, "recipe.toml")
-    with pytest.raises(UsageError, match=r"RRID-C02.*a recipe of rrrid import.*names: rrr"):
-        load_robot(path)
 
 
 def test_a_folder_of_recordings_points_to_the_import(tmp_path: Path) -> None:
