@@ -13,7 +13,6 @@ from functools import lru_cache
 import numpy as np
 
 from pipelines.dynamics.rrr import rigid_body
-from pipelines.io import schema
 from pipelines.io.log import Array, Controller, ExperimentLog, Signal
 from pipelines.io.robot import RobotDescription, format_robot
 from pipelines.io.robot_files import load_robot
@@ -129,12 +128,6 @@ def good_log(seed: int = 0, **options: object) -> ExperimentLog:
 def with_signal(log: ExperimentLog, **changes: Array) -> ExperimentLog:
     """`log` with other samples in some of its signals."""
     return replace(log, signals={**log.signals, **{k: replace(log.signals[k], values=v) for k, v in changes.items()}})
-
-
-def with_extra(log: ExperimentLog, name: str, value: float) -> ExperimentLog:
-    """`log` with one more signal, all of it `value`."""
-    extra = Signal(np.full_like(log.q, value), schema.unit_of(name), schema.SIGNALS[name][1])
-    return replace(log, signals={**log.signals, name: extra})
 
 
 def changed(log: ExperimentLog, name: str, where: object, value: object) -> ExperimentLog:

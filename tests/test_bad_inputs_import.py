@@ -11,11 +11,10 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, RrridError
+from pipelines.errors import EnvironmentFault, InputRejected, RrridError
 from pipelines.import_log import STAGE, Result, Settings, compute
-from pipelines.io.files import open_log
 from tests.importers.good import RECIPE, codes, good, lines, run, strict_checker, text, write
-from tests.repairs import REPAIRS, Repair, clock_set_back, lossy, rows_changed, spoiled
+from tests.repairs import REPAIRS, Repair, lossy, rows_changed, spoiled
 
 
 @pytest.fixture(scope="module")
@@ -44,11 +43,6 @@ def test_what_can_be_mended_is_mended_said_and_an_error_when_strict(repair: Repa
             run(folder, repair.recipe, strict=True)
     elif repair.code != "T05":
         assert run(folder, repair.recipe, strict=True).result.logs
-
-
-def test_t01_the_parts_are_logs_of_their_own(folder: Path) -> None:
-    clock_set_back(folder)
-    assert [(i.name, i.samples) for i in run(folder).result.logs] == [("run-1", 600), ("run-2", 600)]
 
 
 def test_t04_a_part_without_a_whole_period_has_none(folder: Path) -> None:
@@ -131,21 +125,6 @@ def test_what_cannot_be_mended_is_refused_with_place_and_remedy(name: str, folde
     assert not (folder.parent / "out").exists()
 
 
-def test_c06_where_nothing_matches_the_files_that_are_there_are_named(folder: Path) -> None:
-    """Recordings first, a few of them; where --source was given nobody is told to give it."""
-    (folder / "run.csv").unlink()
-    with pytest.raises(NothingMatched, match="no file lies there"):
-        run(folder)
-    (folder / "notes.txt").write_text("nothing")
-    for k in range(6):
-        write(folder, text(good()), f"day_{k}.npy")
-    with pytest.raises(NothingMatched) as caught:
-        run(folder)
-    assert "there lie day_0.npy, day_1.npy, day_2.npy, day_3.npy, day_4.npy and 2 more" in caught.value.message
-    assert "--source" not in caught.value.remedy
-    assert "match" in caught.value.remedy
-
-
 def test_f15_a_file_that_is_still_written(folder: Path) -> None:
     import fcntl
 
@@ -153,29 +132,6 @@ def test_f15_a_file_that_is_still_written(folder: Path) -> None:
         fcntl.flock(logger, fcntl.LOCK_EX)
         with pytest.raises(EnvironmentFault, match=r"RRID-F15.*run.csv.*in use"):
             run(folder)
-
-
-def test_d07_angles_that_wrap_are_unwrapped_without_being_asked(folder: Path) -> None:
-    """D07: joint 1 turns through ±pi; its wrapped angle comes back as the motion it was, but for whole turns."""
-    columns = good()
-    turning = 3.0 + 6.0 * columns["t"]
-    write(folder, text(columns | {"q_1": np.mod(turning + np.pi, 2 * np.pi) - np.pi}))
-    outcome = run(folder)
-    assert codes(outcome) == {"D07": "warn"}
-    assert np.allclose(np.diff(open_log(outcome.folder / "logs" / "run.h5").log.q[:, 0]), np.diff(turning), atol=1e-12)
-
-
-def test_s04_assume_units_takes_si_and_says_so(folder: Path) -> None:
-    assert codes(run(folder, unit_away(RECIPE), assume_units=True)) == {"S04": "warn"}
-
-
-def test_s05_newton_metres_that_are_newton_millimetres(folder: Path) -> None:
-    """S05: the remedy stands in the recipe, for there is no log yet; with it the import is in order."""
-    columns = good()
-    write(folder, text(columns | {f"tau_{j}": 200.0 * columns[f"tau_{j}"] for j in (1, 2, 3)}))
-    with pytest.raises(InputRejected, match=r'RRID-S05.*looks like N mm.*Declare the unit of tau .* unit = "N mm"'):
-        run(folder)
-    assert run(folder, RECIPE.replace('"N m"', '"N mm"')).result.logs
 
 
 def test_s07_radians_that_are_degrees(folder: Path) -> None:

@@ -63,16 +63,6 @@ def test_the_same_arm_agrees(tmp_path: Path) -> None:
         ("torque rms validate joint 2", 0.01, 0.02)]
 
 
-def test_two_robots_are_called_two(tmp_path: Path) -> None:
-    """Named in the first words; of one robot nothing is said."""
-    one, other = written(tmp_path / "monday", 1), written(tmp_path / "friday", 2, robot="another")
-    words = "They are of two robots, arm and another: a difference is no change of one machine."
-    for moved in ((0, 0.0), (1, 40.0)):
-        third = written(tmp_path / "sunday", 2, moved, robot="another")
-        assert words in go(tmp_path, one, third).report.verdict
-    assert "robots" not in go(tmp_path, other, third).report.verdict
-
-
 def test_what_moved_is_named(tmp_path: Path) -> None:
     """One figure by ten std: it stands first, alone, with its z; the verdict names both results by their folders."""
     outcome = go(tmp_path, written(tmp_path / "monday", 1), written(tmp_path / "friday", 2, (11, 10.0 * math.sqrt(2.0))))
@@ -95,21 +85,6 @@ def test_findings_that_come_or_go(tmp_path: Path) -> None:
     assert outcome.exit_code == 1
 
 
-def test_models_are_compared(tmp_path: Path, samples: Path) -> None:
-    """Two model files: the shipped one with itself, then with one base parameter moved by 50 std."""
-    model = json.loads((samples / "models/rrr.json").read_text())
-    for entry in model["base_parameters"]:
-        entry["std"] = 0.01
-    (tmp_path / "one").mkdir()
-    (tmp_path / "one/model.json").write_text(json.dumps(model))
-    model["base_parameters"][2]["value"] += 0.5
-    (tmp_path / "two.json").write_text(json.dumps(model))
-    assert go(tmp_path, tmp_path / "one/model.json", tmp_path / "one/model.json").exit_code == 0
-    outcome = go(tmp_path, tmp_path / "one/model.json", tmp_path / "two.json")
-    assert [one.name.removeprefix("base parameters ") for one in outcome.result.figures if one.beyond] == [
-        model["base_parameters"][2]["name"]]
-
-
 def model(**effects: dict[str, tuple[float, float]]) -> dict[str, Any]:
     """A model file with Coulomb friction at joint 1, and at joint 2 these effects: parameter -> value, std."""
     told = [{"effect": name, "joint": 2, "parameters": {key: {"value": value, "std": std, "unit": "rad", "origin": "fitted"}
@@ -118,25 +93,6 @@ def model(**effects: dict[str, tuple[float, float]]) -> dict[str, Any]:
     level = {"level": {"value": 1.0, "std": 0.1, "unit": "N m", "origin": "fitted"}}
     return {"format": "rrrid-model", "name": "arm-1", "robot": 'name = "arm"', "base_parameters": [], "effects": told,
             "friction": [{"effect": "coulomb", "joint": 1, "parameters": level}]}
-
-
-def extended(folder: Path, seed: int, **effects: dict[str, tuple[float, float]]) -> Path:
-    """A result of extend: the effects as findings, and again in its model; the torque error before and after."""
-    held = model(**effects)
-    findings = [{"cause": one["effect"], "joint": one["joint"], "parameters": one["parameters"]} for one in held["effects"]]
-    rms = {name: {"validate": [error * seed], "noise_floor": [0.01]} for name, error in (("residual_rms", 0.3), ("after_rms", 0.1))}
-    return written(folder, seed, command="extend", parameters=[], findings=findings, model=held, **rms)
-
-
-def test_a_phase_moves_the_shorter_way_around(tmp_path: Path) -> None:
-    """2.40 and -2.96 rad are 0.92 rad apart; what has no period, the rest angle of a spring, moved by 5.4 rad."""
-    phases = ({"phase_2": (2.4024, 0.1439)}, {"phase_2": (-2.9644, 0.0289)})
-    rest = ({"rest_angle": (2.4024, 0.1439)}, {"rest_angle": (-2.9644, 0.0289)})
-    a, b = (extended(tmp_path / name, 1, cogging=phase, spring=angle)
-            for name, phase, angle in zip("ab", phases, rest, strict=True))
-    away = {one.name: (round(one.away, 1), one.period) for one in go(tmp_path, a, b).result.figures}
-    assert away["model cogging joint 2 phase 2"] == (6.2, 2.0 * math.pi)
-    assert away["model spring joint 2 rest angle"] == (-36.6, None)
 
 
 def bad(folder: Path, text: str) -> Path:

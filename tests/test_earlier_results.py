@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +10,8 @@ import pytest
 from pipelines import convert, inspect
 from pipelines.errors import UsageError
 from pipelines.io.files import write_log
-from pipelines.report.report import Report
-from pipelines.stage import Outcome, Request, Stage, read_logs, run_stage
+from pipelines.stage import Outcome, Request, run_stage
+from tests.folders import contents
 from tests.io.logs import small_log
 
 
@@ -34,43 +32,18 @@ def _inspected(day: str, **more: Any) -> Outcome[Any]:
     return run_stage(inspect.STAGE, Request((Path(day) / "logs",), no_report=True, **more), inspect.Settings())
 
 
-def _contents(folder: Path) -> dict[str, str]:
-    return {p.relative_to(folder).as_posix(): hashlib.sha256(p.read_bytes()).hexdigest() for p in folder.rglob("*") if p.is_file()}
-
-
 @pytest.mark.row("C05")
 def test_a_result_of_another_command_is_refused(days: Path) -> None:
     """Before anything is computed, and untouched; --force replaces it. The same command's is replaced without a word."""
     out = Path("out")
     _converted("monday", out=out)
-    before = _contents(out)
+    before = contents(out)
     with pytest.raises(UsageError, match=r"RRID-C05 out: holds the earlier result of convert.*--out.*--force"):
         _inspected("monday", out=out)
-    assert _contents(out) == before
+    assert contents(out) == before
     for day in ("tuesday", "monday"):
         assert not [check for check in _converted(day, out=out).checks if check.code == "RRID-C05"]
-    assert _contents(out).keys() == before.keys()
+    assert contents(out).keys() == before.keys()
     _inspected("monday", out=out, force=True)
     assert not (out / "logs").exists()
     assert [path.name for path in days.glob("out*")] == ["out"]
-
-
-@dataclass(frozen=True)
-class _Nothing:
-    pass
-
-
-@pytest.mark.row("C05")
-def test_a_stage_within_a_run_is_no_output_of_that_command(days: Path) -> None:
-    """Its folder has the command's name and its result.json, and is a part of the run: neither replaced nor moved."""
-    def write(result: _Nothing, folder: Path, request: Request) -> None:
-        (folder / "inspect").mkdir()
-        (folder / "inspect/result.json").write_text('{"command": "inspect"}')
-
-    stage = Stage("run", "A stage to test with", _Nothing, lambda inputs, settings: settings,
-                  lambda result: Report("Test", "done"), read_logs, write)
-    run_stage(stage, Request((Path("monday/logs"),), out=Path("all")), _Nothing())
-    before = _contents(Path("all"))
-    with pytest.raises(UsageError, match=r"RRID-C05 all/inspect: .*result\.json"):
-        _inspected("monday", out=Path("all/inspect"), force=True)
-    assert _contents(Path("all")) == before

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import dataclasses
 import inspect
 import json
 from dataclasses import replace
@@ -31,9 +30,7 @@ from rrrid_cli.app import STAGES
 from tests.controlled import controlled_log
 from tests.diagnose.sessions import but, session, written
 from tests.healthy import begun
-from tests.importers.good import RECIPE, good, text, write
-from tests.importers.good import run as run_import
-from tests.repairs import REPAIRS, Repair
+from tests.importers.good import RECIPE
 from tests.test_compare import written as written_result
 
 REPO = Path(__file__).resolve().parents[1]
@@ -126,15 +123,6 @@ def test_a_stage_says_what_it_reads_and_writes(module: str) -> None:
 
 
 @pytest.mark.parametrize("module", MODULES)
-def test_settings_are_frozen_and_have_defaults(module: str) -> None:
-    """Every option has its default in one place, and no stage can change what it was given."""
-    stage = _stage(module)
-    assert dataclasses.is_dataclass(stage.settings)
-    assert stage.settings.__dataclass_params__.frozen  # type: ignore[attr-defined]
-    stage.settings()
-
-
-@pytest.mark.parametrize("module", MODULES)
 def test_compute_opens_no_file_and_prints_nothing(module: str) -> None:
     """Compute, draw, write: three functions. The two first name nothing that touches the disk or the screen."""
     for function in (_stage(module).compute, _stage(module).report):
@@ -196,15 +184,3 @@ def test_every_log_a_stage_writes_is_in_order(ran: Ran, tmp_path: Path) -> None:
     logs, complaints = _examined(ran[1].folder, tmp_path / "examined")
     assert logs > 0
     assert complaints == []
-
-
-@pytest.mark.parametrize("repair", [pytest.param(one, id=one.row.replace(" ", "-"), marks=pytest.mark.slow if k % 3 else ())
-                                    for k, one in enumerate(REPAIRS)])
-def test_what_an_import_has_mended_is_in_order(repair: Repair, tmp_path: Path) -> None:
-    """Import and doctor judge by the same limits: nothing is left to reject or to mend, but glitches, which are recorded."""
-    write(tmp_path / "data", text(good()))
-    repair.spoil(tmp_path / "data")
-    outcome = run_import(tmp_path / "data", repair.recipe)
-    logs, complaints = _examined(outcome.folder, tmp_path / "examined")
-    assert logs == len(outcome.result.logs) > 0
-    assert [c for c in complaints if not (repair.code == c.code[-3:] == "D06")] == []

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.import_log import STAGE, Settings
 from pipelines.io.files import open_log
-from pipelines.stage import Request, run_stage
 from tests.importers.good import RECIPE, good, run, strict_checker, text, write
 from tests.repairs import split_files
 
@@ -36,13 +34,6 @@ def test_a_good_recording_is_imported_bit_for_bit(folder: Path, checker: ModuleT
     assert not outcome.checks
     assert "nothing had to be repaired" in outcome.report.verdict
     assert not any(checker.check_folder(outcome.folder).values())
-
-
-def test_equal_inputs_give_equal_files(folder: Path) -> None:
-    first = run(folder, RECIPE + "[resample]\nrate = 500\n")
-    bytes_of = (first.folder / "logs" / "run.h5").read_bytes(), (first.folder / "result.json").read_bytes()
-    again = run(folder, RECIPE + "[resample]\nrate = 500\n")
-    assert ((again.folder / "logs" / "run.h5").read_bytes(), (again.folder / "result.json").read_bytes()) == bytes_of
 
 
 def test_one_recipe_covers_many_files(folder: Path) -> None:
@@ -116,14 +107,6 @@ def test_a_controller_is_kept(folder: Path) -> None:
     assert log.controller.kp is not None
     assert log.controller.kp.tolist() == [1.0, 2.0, 3.0]
     assert log.controller.feedforward == ("friction",)
-
-
-def test_parquet_on_request(folder: Path) -> None:
-    (folder.parent / "recipe.toml").write_text(RECIPE)
-    request = Request((), folder.parent / "out", format="parquet", no_report=True)
-    outcome = run_stage(STAGE, request, Settings(recipe=str(folder.parent / "recipe.toml"), source=folder))
-    assert [item.file for item in outcome.result.logs] == ["logs/run.parquet"]
-    assert np.array_equal(open_log(outcome.folder / "logs" / "run.parquet").log.t, good()["t"])
 
 
 @pytest.mark.parametrize(("samples", "periods"), [(1000, 1), (1001, 1), (999, 0)])

@@ -6,11 +6,9 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from pipelines import import_log, inspect
-from pipelines.errors import InputRejected
 from pipelines.io.files import find_logs, open_log, write_log
 from pipelines.io.log import ExperimentLog
 from pipelines.stage import Outcome, Request, run_stage
@@ -45,13 +43,6 @@ def test_exit_codes(row: str, plain: int, checked: int, tmp_path: Path) -> None:
     assert doctor(tmp_path / "b", log, check=True).exit_code == checked
 
 
-def test_strict_does_not_mend(tmp_path: Path) -> None:
-    with pytest.raises(InputRejected) as problem:
-        doctor(tmp_path, MAKE["T01"](good_log()), strict=True)
-    assert problem.value.code == "RRID-T01"
-    assert not (tmp_path / "out").exists()
-
-
 @pytest.mark.parametrize("check", [False, True])
 def test_a_file_that_cannot_be_opened_is_a_finding(check: bool, tmp_path: Path) -> None:
     """The doctor examines the healthy log all the same; what is rejected is exit 3, with --check as well (bad-inputs.md, F02)."""
@@ -84,19 +75,8 @@ def test_the_result_holds_what_the_contract_says(tmp_path: Path) -> None:
     assert outcome.exit_code == 0
 
 
-def test_equal_logs_give_equal_results(tmp_path: Path) -> None:
-    texts = []
-    for name in ("a", "b"):
-        folder = tmp_path / "same"
-        folder.mkdir(exist_ok=True)
-        doctor(folder, good_log())
-        texts.append((folder / "out" / "result.json").read_bytes())
-        (folder / "out").rename(tmp_path / name)
-    assert texts[0] == texts[1]
-
-
 @pytest.mark.parametrize("row", ["T04", "T08 none", *rarely(
-    "D02 channel", "T01", "T08", "S08 ns", "S08 neither", "D03 huge", "D05 flat top", "D11 power")])
+    "D02 channel", "T01", "T08", "S08 neither", "D05 flat top", "D11 power")])
 def test_the_report_of_a_broken_log_is_drawn(row: str, tmp_path: Path) -> None:
     """One page, without script, that names the finding, within 200 kB."""
     outcome = doctor(tmp_path, MAKE[row](good_log()), no_report=False)
@@ -180,34 +160,3 @@ def test_a_folder_is_judged_as_a_whole(tmp_path: Path) -> None:
     assert outcome.report.verdict.startswith("Of 4 logs 1 cannot be used, 1 should be looked at. First of all: sample_time is 1000")
     assert outcome.report.tone == "bad"
     assert outcome.exit_code == 3
-
-
-def test_signals_of_the_preview_cover_the_log() -> None:
-    """Envelopes keep the extremes: no peak is lost in 400 points."""
-    from pipelines.quality.checks import Subject
-    from pipelines.report.log_preview import log_preview
-
-    log = good_log()
-    preview = log_preview(Subject(log))
-    assert len(preview.t) <= 400
-    np.testing.assert_array_equal(preview.q.max(axis=0), log.q.max(axis=0))
-    np.testing.assert_array_equal(preview.tau.min(axis=0), log.tau.min(axis=0))
-
-
-def test_several_robots_are_named(tmp_path: Path) -> None:
-    """Logs of two robots are not "all logs": the verdict counts the robots, and the table names them."""
-    outcome = doctor(tmp_path, good_log(), replace(good_log(1), robot_name="another"))
-    assert "2 logs of 2 robots are in order" in outcome.report.verdict
-    (logs,) = next(s for s in outcome.report.sections if s.title == "The logs").tables
-    assert [row[logs.columns.index("robot")] for row in logs.rows] == ["rrr-tue", "another"]
-
-
-def test_a_channel_used_twice_is_seen(tmp_path: Path) -> None:
-    """S13: torque 1 in the place of torque 2, sample for sample, independent of the model."""
-    log = good_log()
-    outcome = doctor(tmp_path, with_signal(log, tau=log.tau[:, [0, 0, 2]]), check=True)
-    (twice,) = [c for c in outcome.result.checks if "sample for sample" in c.message]
-    assert (twice.code, twice.gate) == ("RRID-S13", True)
-    assert "tau of joint 1 and tau of joint 2" in twice.message
-    assert not [c for c in outcome.result.checks if c.code == "RRID-S13" and c.level == "ok"]
-    assert outcome.exit_code == 1

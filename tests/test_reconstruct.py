@@ -23,7 +23,7 @@ from pipelines.stage import Outcome, Request, run_stage
 from tests.cli.commands import rrrid
 from tests.fault_table import FAULTS
 from tests.faulty import good_path
-from tests.healthy import AMPLIFIER, ENCODER, good_log, make_log, rest, rows
+from tests.healthy import AMPLIFIER, ENCODER, good_log, make_log, rest
 
 Settings = reconstruct.Settings
 
@@ -51,17 +51,6 @@ def test_measured_minus_reconstructed_is_below_the_papers(sampled: Outcome[recon
         assert (log.reconstruction_error_max <= 5e-4).all(), log.name
         assert (log.reconstruction_error_max <= ENCODER).all(), log.name
     assert (sampled.result.reconstruction_error_max <= 5e-4).all()
-
-
-@pytest.mark.parametrize("method", ["observer", "smoother"])
-def test_the_papers_rule_stays_below_as_well(method: str, samples: Path, tmp_path: Path) -> None:
-    """With the jerk of the paper's rule the observer hardly filters, and follows even more closely."""
-    log = open_log(samples / "rrr-closed-form/excitation-1.h5").log
-    first = stage(tmp_path / "a", log, settings=Settings(method)).result.logs[0]
-    asked = Settings(method, jerk_std=tuple(first.observer.jerk_std_paper.tolist()))
-    ruled = stage(tmp_path / "b", log, settings=asked).result.logs[0]
-    assert (ruled.reconstruction_error_max <= 5e-4).all()
-    assert (ruled.observer.bandwidth_hz > first.observer.bandwidth_hz).all()
 
 
 def test_gains_are_those_of_the_riccati_equation(tmp_path: Path) -> None:
@@ -92,18 +81,6 @@ def test_a_derived_log_is_a_log(container: str, shared: Path, tmp_path: Path) ->
     if container == "h5":
         done = subprocess.run([sys.executable, shared / "tools/check_log.py", path], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout
-
-
-def test_deriving_again_changes_nothing(tmp_path: Path) -> None:
-    """The stage on its own output, in the other container: the same result and the same samples."""
-    first = stage(tmp_path / "a", good_log(), container="parquet")
-    again = run_stage(reconstruct.STAGE, Request((first.folder / "logs",), out=tmp_path / "b", no_report=True), Settings())
-    assert open_log(tmp_path / "b/logs/log-0.h5").log == open_log(first.folder / "logs/log-0.parquet").log
-    mine, theirs = dict(again.json), dict(first.json)
-    for result in (mine, theirs):
-        for log in result["logs"]:
-            log.pop("source")
-    assert mine == theirs
 
 
 REJECTED = [f.row for f in FAULTS if f.row[0] in "TD" and f.level == "reject"]
@@ -161,24 +138,6 @@ def test_innovations_are_judged(tmp_path: Path) -> None:
     assert np.isnan(still.innovation_whiteness).all()
 
 
-def test_far_from_the_encoder_is_an_alarm(tmp_path: Path) -> None:
-    """More than 5e-4 rad: attention, and exit 1 with --check; without it, or within it, 0; a slide is not judged by it."""
-    result = stage(tmp_path / "a", good_log()).result
-    assert reconstruct.exit_code(result, True) == 0
-    log = replace(result.logs[0], reconstruction_error_max=np.array([1e-5, 6e-4, 1e-5]))
-    far = replace(result, logs=(log,))
-    assert (reconstruct.exit_code(far, True), reconstruct.exit_code(far, False)) == (1, 0)
-    assert reconstruct.report(far).tone == "attention"
-    assert "joint 2 strays" in reconstruct.report(far).verdict
-    slide = replace(result, logs=(replace(log, units=("rad", "m", "rad")),))
-    assert reconstruct.exit_code(slide, True) == 0
-    assert reconstruct.report(slide).tone == "good"
-    assert "strays" not in reconstruct.report(slide).verdict
-    stiff = stage(tmp_path / "b", good_log(), settings=Settings(jerk_std=(0.01,)))
-    assert (stiff.result.reconstruction_error_max > 5e-4).any()
-    assert any(check.code == "RRID-D12" and check.gate for check in stiff.result.checks)
-
-
 def test_plans_have_no_motion(tmp_path: Path) -> None:
     """A planned trajectory beside logs is passed over and named; alone it is nothing to reconstruct."""
     log = good_log()
@@ -188,13 +147,6 @@ def test_plans_have_no_motion(tmp_path: Path) -> None:
     assert any("plan" in check.message for check in outcome.result.checks)
     with pytest.raises(NothingMatched):
         stage(tmp_path / "b", plan)
-
-
-@pytest.mark.slow
-def test_a_short_log_and_an_order_of_two(tmp_path: Path) -> None:
-    """A hundred and ten samples are enough; so is a model without acceleration as a state."""
-    outcome = stage(tmp_path, rows(good_log(), slice(1000, 1110)), settings=Settings(order=2), report=True)
-    assert outcome.result.observer.gains.shape == (3, 2)
 
 
 def test_command_line(samples: Path, tmp_path: Path) -> None:

@@ -101,23 +101,6 @@ def sessions(tmp_path: Path, samples: Path, **logs: tuple[str, str | None]) -> d
     return {part.name: {opened.log.name for opened in part.logs} for part in apart(inputs.logs)}
 
 
-def test_days_are_apart_and_share_what_was_recorded_before(samples: Path, tmp_path: Path) -> None:
-    """A reference tells of every later day and of none before it."""
-    first, between, last = "2026-03-02T09:00:00Z", "2026-03-04T10:00:00Z", "2026-05-18T09:00:00Z"
-    found = sessions(tmp_path, samples, a=("identify", first), b=("validate", first), c=("reference", between),
-                    d=("identify", last), e=("validate", last))
-    assert found == {"rrr-tue 2026-03-02": {"a", "b"}, "rrr-tue 2026-05-18": {"c", "d", "e"}}
-
-
-def test_a_reference_belongs_to_what_it_is_compared_with(samples: Path, tmp_path: Path) -> None:
-    """One session from whenever its reference is; a time that nobody told, or a wrong one, parts nothing from its reference."""
-    day, later = "2026-03-04T10:00:00Z", "2026-05-18T09:00:00Z"
-    for number, (reference, rest) in enumerate(((day, later), (None, later), (day, None), (day, day), (later, day))):
-        (tmp_path / str(number)).mkdir()
-        found = sessions(tmp_path / str(number), samples, c=("reference", reference), d=("identify", rest))
-        assert list(found.values()) == [{"c", "d"}]
-
-
 def test_the_sample_logs_are_three_sessions(samples: Path) -> None:
     """The arm in closed form; the arm of the bench in order; the same one later, with its commissioning."""
     inputs = read_logs(Request((samples,)), run.Settings())

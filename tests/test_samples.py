@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.experiments import WRITING_CASES
 from pipelines.dynamics.arm import Arm
 from pipelines.io.files import open_log
 from pipelines.io.log import ExperimentLog, digest_of
@@ -93,16 +92,6 @@ def test_nothing_in_the_changed_logs_tells_what_changed(samples: Path) -> None:
     assert replace(after, **told) == before
     assert set(after.signals) == set(before.signals)
     assert "link" not in after.robot_text
-
-
-def test_every_kind_of_experiment_is_there(samples: Path) -> None:
-    """Of the healthy machine, with every case of feed-forward and every joint's frequency response in two postures."""
-    logs = [open_log(path).log for path in sorted((samples / "rrr-healthy").iterdir())]
-    assert {log.experiment for log in logs} == {"friction", "hold", "excitation", "free", "writing", "frf"}
-    assert {log.role for log in logs if log.experiment == "excitation"} == {"identify", "validate"}
-    writing = [log.controller.feedforward or () for log in logs if log.experiment == "writing" and log.controller]
-    assert sorted(writing, key=WRITING_CASES.index) == list(WRITING_CASES)
-    assert [log.joint for log in logs if log.experiment == "frf"] == [1, 1, 2, 2, 3, 3]
 
 
 def test_writing_by_feedback_alone_errs_by_millimetres(samples: Path, arm: Arm) -> None:

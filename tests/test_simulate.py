@@ -53,15 +53,6 @@ def test_the_simulated_log_is_a_log(tmp_path: Path) -> None:
     assert again.torque_rms.max() < 1e-12
 
 
-def test_a_fault_moves_the_joint_it_is_at(tmp_path: Path) -> None:
-    """Drag at joint 2: its position strays most, and by more the stronger it is, in proportion."""
-    faults = [(f"quadratic_drag:2:coefficient={c}",) for c in (0.1, 0.2)]
-    weak, strong = (simulated(controlled_log(SAMPLES), tmp_path, Settings("rrr", fault)).result.logs[0] for fault in faults)
-    assert np.argmax(strong.position_rms) == 1
-    assert strong.position_rms[1] / weak.position_rms[1] == pytest.approx(2.0, rel=0.1)
-    assert strong.position_rms[1] > 1e-4
-
-
 def test_without_a_controller_it_is_windows(tmp_path: Path) -> None:
     """The log says nothing of its controller: short windows, no simulated log, and the reason as a check."""
     outcome = simulated(replace(controlled_log(SAMPLES), controller=None), tmp_path, Settings("rrr", window=0.05))
@@ -91,9 +82,7 @@ def test_a_plan_is_simulated_and_compared_with_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("settings", "code"), [
     (Settings(), "C02"), (Settings("nobody"), "C04"), (Settings("rrr", ("coulom:1:level=1",)), "C01"),
-    (Settings("rrr", noise=(1.0, 2.0)), "C02"), (Settings("rrr", noise=(-1.0,)), "C02"), (Settings("rrr", replicas=2), "C02"),
-    (Settings("rrr", replicas=0), "C02"), (Settings("rrr", steps=0), "C02"), (Settings("rrr", window=0.0), "C02"),
-    (Settings("rrr", seed=-1), "C02"), (Settings("rrr", noise=(float("nan"),)), "C02"),
+    (Settings("rrr", noise=(1.0, 2.0)), "C02"), (Settings("rrr", replicas=2), "C02"), (Settings("rrr", window=0.0), "C02"),
 ])
 def test_settings_that_do_not_fit_are_refused(settings: Settings, code: str, tmp_path: Path) -> None:
     """With a code and a remedy, and nothing is written."""

@@ -58,11 +58,6 @@ def test_frame_has_a_row_a_parameter_with_its_std(model: rrrid.Answer):
     assert np.all(table["std"] > 0.0)
 
 
-def test_frame_of_rows_that_are_not_there_names_those_that_are(model: rrrid.Answer):
-    with pytest.raises(UsageError, match="parameters"):
-        model.to_frame("joint_angles")
-
-
 def test_figures_are_drawn_by_name(model: rrrid.Answer):
     drawing = model.plot(model.figures[-1])
     assert any(axes.has_data() for axes in drawing.axes)
@@ -136,10 +131,6 @@ def test_what_is_no_answer_is_refused_with_what_to_do():
         rrrid.load(3)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="tuple"):
         rrrid.extend(rrrid.load(LOGS / "hold-1.h5"), **{"causes": "cogging:2"})
-
-
-def test_answer_is_shown_in_one_line(model: rrrid.Answer):
-    assert repr(model) == f"<estimate-bps: {model.summary}>"
 
 
 def test_model_is_exported(model: rrrid.Answer, tmp_path: Path):

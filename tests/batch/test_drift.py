@@ -22,17 +22,6 @@ def _records(values: np.ndarray) -> list[Session]:
                     recorded=f"2026-01-{i + 1:02d}T00:00:00Z") for i, value in enumerate(values)]
 
 
-def test_normal_scatter_is_no_drift() -> None:
-    """400 batches of 12 items that only scatter: χ² has its mean and its quantiles, and 3 std are passed as rarely as by chance."""
-    rng = np.random.default_rng(1)
-    courses = [drift_of(_records(1.0 + STD * rng.normal(size=12)))[0].figures[0] for _ in range(400)]
-    chi_square = np.array([course.chi_square for course in courses])
-    assert courses[0].freedom == 11
-    assert abs(chi_square.mean() - 11.0) < 4.0 * np.sqrt(22.0 / 400)
-    assert 0.02 < np.mean([course.probability < 0.05 for course in courses]) < 0.09  # type: ignore[operator]
-    assert np.mean([abs(far) > 3.0 for course in courses for far in course.away]) < 0.006
-
-
 def test_a_step_is_dated() -> None:
     """Six std in one item: that one has moved, by about as much, no other is blamed for it, and χ² says that something did."""
     values = 1.0 + STD * np.random.default_rng(2).normal(size=10)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import FrozenInstanceError, is_dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -62,16 +61,3 @@ def test_no_jump_at_zero(name: str, joint: int) -> None:
     whole, little = moved(name, joint, 1.0), moved(name, joint, 1e-3)
     assert whole.max() > 1e-6
     assert (little <= 2e-3 * whole).all(), little / whole
-
-
-@pytest.mark.parametrize("name", fault_names())
-def test_a_fault_is_frozen_and_says_what_it_is(name: str) -> None:
-    """A frozen dataclass, its parameters finite, the same whenever it is made of the same seed."""
-    fault = with_fault(name, 2, 1.0)
-    assert fault == with_fault(name, 2, 1.0)
-    assert is_dataclass(fault)
-    assert fault.name == name
-    assert fault.parameters()
-    assert all(np.isfinite(value).all() for value in fault.parameters().values())
-    with pytest.raises(FrozenInstanceError):
-        fault.joint = 1  # type: ignore[misc]

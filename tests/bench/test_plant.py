@@ -8,15 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.control import ComputedTorque, Decentralised, OpenLoop
+from bench.control import Decentralised, OpenLoop
 from bench.draw import draw_machine, paper_machine
 from bench.faults import make
 from bench.faults.structure import BaseResonance
 from bench.motions import at_rest
 from bench.plant import run
 from pipelines.errors import UsageError
-from tests.bench.link_model import LinkModel
-from tests.bench.machines import CENTRE, frictionless, sway, turntable
+from tests.bench.machines import frictionless, sway, turntable
 from tests.seeds import rarely
 
 
@@ -71,20 +70,6 @@ def test_delay_of_one_sample() -> None:
         second.tau[1:], (-np.array(late.kp) * e - np.array(late.kd) * de)[:-1], atol=1e-9
     )
     assert np.abs(first.tau[1:5]).max() > 0.0
-
-
-def test_computed_torque_makes_a_double_integrator() -> None:
-    """Eq. (25)-(27) on the true model without friction: q̈ = r, so q̇ after the kick v T is v T on
-    that joint alone.
-    """
-    machine = frictionless(draw_machine(8, nuisances=False).ideal)
-    reference = at_rest(CENTRE, 0.1)
-    v = np.zeros((100, 3))
-    v[20:50, 0] = 8.0  # [rad/s^2]
-    law = ComputedTorque(LinkModel(machine, error=0.0), v, (0.0,) * 3, (0.0,) * 3)
-    recording = run(machine, law, reference)
-    np.testing.assert_allclose(recording.true_dq[60], [8.0 * 0.03, 0.0, 0.0], atol=2e-3)
-    np.testing.assert_array_equal(recording.extras["r"], v)
 
 
 def test_what_cannot_be_integrated_leaves_no_file(

@@ -107,20 +107,3 @@ def test_parts_of_the_torque_are_pinocchios() -> None:
             strict=True,
         ):
             np.testing.assert_allclose(ours, theirs, atol=1e-11)
-
-
-def test_the_papers_machine_has_the_printed_base_parameters() -> None:
-    """D(q) of its bodies against the printed p1, p2, p3, p5, p6, p7, p8 (Table V) where they alone
-    decide.
-
-    D11 at q2 = q3 = 0 is p1 + 2 a2 p3 + p5 + p7, at q2 = 0, q3 = π/2 it is p1 + p7 (p4 = 0).
-    """
-    rigid = RigidDynamics(draw_paper().robot)
-    assert abs(rigid.mass_matrix(np.zeros(3))[0, 0] - 1.2538) < 5e-5
-    assert abs(rigid.mass_matrix(np.array([0.0, 0.0, np.pi / 2]))[0, 0] - 1.1101) < 5e-5
-
-
-def draw_paper() -> Machine:
-    from bench.draw import paper_machine
-
-    return paper_machine()

@@ -104,13 +104,6 @@ def test_nothing_in_a_log_tells_the_fault(
         assert np.abs(values / step - np.round(values / step)).max() < 1e-6
 
 
-def test_references_keep_the_limits(machine: Machine, plans: list[Experiment]) -> None:
-    for plan in plans:
-        for signal, key in ((plan.reference.dq, "velocity"), (plan.reference.ddq, "acceleration")):
-            limits = np.array([getattr(joint, key) for joint in machine.robot.joints])
-            assert (np.abs(signal).max(axis=0) <= 1.001 * limits).all(), (plan.name, key)
-
-
 @pytest.mark.parametrize(
     "joint", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)]
 )

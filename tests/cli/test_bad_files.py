@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -18,8 +17,6 @@ import pytest
 from pipelines.io.files import write_log
 from tests.cli.commands import rrrid
 from tests.healthy import good_log
-from tests.io.logs import small_log
-from tests.rows.commanded import Command
 
 
 def _bytes(change: Callable[[bytes], bytes]) -> Callable[[Path], None]:
@@ -54,46 +51,10 @@ def _attribute(name: str, value: object) -> Callable[[Path], None]:
     return spoil
 
 
-def _fifo(path: Path) -> None:
-    path.unlink()
-    os.mkfifo(path)
-
-
 def _flip_page(path: Path) -> None:
     chunk = pq.ParquetFile(path).metadata.row_group(0).column(1)
     at = chunk.data_page_offset + chunk.total_compressed_size // 2
     _bytes(lambda data: data[:at] + bytes([data[at] ^ 1]) + data[at + 1:])(path)
-
-
-ROWS: tuple[tuple[str, str, Callable[[Path], None]], ...] = (
-    ("F02", ".h5", _bytes(lambda data: data[:len(data) // 2])), ("F04", ".parquet", _flip_page), ("F05", ".h5", _manifest),
-)
-
-
-@pytest.mark.parametrize(("row", "ending", "spoil"), ROWS, ids=[f"{row}{ending}" for row, ending, _ in ROWS])
-def test_a_spoilt_file_is_exit_3_with_its_code(row: str, ending: str, spoil: Callable[[Path], None], tmp_path: Path,
-                                                command: Command) -> None:
-    """Beside a good log: the doctor names the bad one, looks at the good one, and ends in 3."""
-    write_log(tmp_path / "logs/good.h5", good_log())
-    write_log(tmp_path / f"logs/bad{ending}", small_log(name="bad"))
-    spoil(tmp_path / f"logs/bad{ending}")
-    done = command("inspect", "logs", "--no-report", "--out", "out")
-    assert done.exit == 3, done.err
-    result = done.object
-    rejected = [check for check in result["checks"] if check["level"] == "reject"]
-    assert [check["code"] for check in rejected] == [f"RRID-{row}"]
-    assert all(check["where"].startswith(f"bad{ending}") and check["remedy"] for check in rejected)
-    assert result["rejected"] == [f"bad{ending}"]
-    assert [log["name"] for log in result["logs"]] == ["excitation-0"]
-
-
-def test_a_pipe_as_a_log_is_exit_3_at_once(tmp_path: Path) -> None:
-    """F12: named on the command line, it is refused before anything waits for it."""
-    write_log(tmp_path / "a.h5", small_log())
-    _fifo(tmp_path / "a.h5")
-    done = rrrid("inspect", "a.h5", "--json", "--out", "out", cwd=tmp_path)
-    assert done.returncode == 3
-    assert json.loads(done.stdout)["error"]["code"] == "RRID-F12"
 
 
 @pytest.mark.row("D14")

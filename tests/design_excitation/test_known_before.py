@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.errors import UsageError
 from pipelines.io.results import headed
 from pipelines.io.robot_files import load_robot
 from tests.design_excitation.short import QUICK, designed
@@ -23,19 +22,6 @@ def test_the_top_harmonic_stays_below_a_mode(tmp_path: Path) -> None:
     out = designed(tmp_path / "out", replace(QUICK, harmonics=None), (tmp_path / "frf",)).folder
     told = json.loads((out / "coefficients.json").read_text())
     assert max(max(joint["harmonics"]) for joint in told["joints"]) / told["period"] == pytest.approx(1.5)
-
-
-@pytest.mark.parametrize(("responses", "code"), [
-    (None, "RRID-C02"), ([{"modes": [{"frequency": 5}]}], "RRID-C02"), ([{"modes": [{"frequency": {"value": -5.0}}]}], "RRID-C02"),
-    ([{"modes": [{"frequency": {"value": 0.3}}]}], "RRID-C08"),
-])
-def test_a_mode_that_cannot_be_kept_below_is_said(responses: object, code: str, tmp_path: Path) -> None:
-    """Nothing that `frf` writes; a mode so low that no motion is left."""
-    (tmp_path / "frf").mkdir()
-    (tmp_path / "frf" / "result.json").write_text(json.dumps(headed("frf", {"responses": responses})))
-    with pytest.raises(UsageError) as told:
-        designed(tmp_path / "out", QUICK, (tmp_path / "frf",))
-    assert told.value.code == code
 
 
 def test_earlier_logs_count(tmp_path: Path, samples: Path) -> None:

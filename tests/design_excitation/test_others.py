@@ -15,7 +15,6 @@ from pipelines.io.files import open_log
 from pipelines.io.robot_files import load_robot
 from pipelines.stage import Request, run_stage
 from tests.design_excitation.short import QUICK, designed
-from tests.seeds import rarely
 
 
 @pytest.mark.parametrize(("purpose", "count"), [("friction", 3), ("frf", 6), ("hold", 8)])
@@ -84,20 +83,3 @@ def test_held_postures_show_gravity(tmp_path: Path) -> None:
     assert p is not None
     tau = BaseArm(body.robot).torque(postures, still, still, p)
     assert (np.abs(tau) <= 0.9 * np.array([60.0, 30.0, 15.0])).all()
-
-
-@pytest.mark.parametrize("purpose", [*rarely("friction"), "frf"])
-def test_plans_keep_the_tip_speed_and_the_torque(purpose: str, tmp_path: Path) -> None:
-    """A slow tip makes plans slower: its speed from its places by differences; the torque of the excitation included."""
-    out = designed(tmp_path / "out", replace(QUICK, experiment=purpose, tip_speed=0.8)).folder
-    robot = load_robot("rrr")
-    arm = BaseArm(robot)
-    p = arm.known_parameters()
-    assert p is not None
-    for path in sorted((out / "logs").glob("*.h5")):
-        log = open_log(path).log
-        tip = arm.tip(log["q_ref"])
-        assert np.linalg.norm(np.diff(tip, axis=0), axis=1).max() / log.sample_time <= 0.8
-        ddq = log["ddq_ref"] + log["v"] if purpose == "frf" else log["ddq_ref"]
-        tau = arm.torque(log["q_ref"], log["dq_ref"], ddq, p)
-        assert (np.abs(tau).max(axis=0) <= 0.9 * np.array([60.0, 30.0, 15.0])).all()

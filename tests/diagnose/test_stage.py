@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -76,34 +75,12 @@ def test_a_cause_is_named_with_its_joint_and_its_numbers(rippled: Outcome[diagno
     assert gain.tip_error_rms.after < gain.tip_error_rms.before
 
 
-SILENT = pytest.mark.xfail(strict=True, reason="two logs of 3 s name nothing without a reference")
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("seconds", [pytest.param(3.0, marks=SILENT), 10.0])
-def test_a_cause_is_named_without_reference_logs(seconds: float, tmp_path: Path) -> None:
-    """Of two logs of so many seconds, blocks of which are held out."""
-    found = asked(written(tmp_path / "logs", session("cogging", 2, seconds)), tmp_path / "out")
+def test_a_cause_is_named_without_reference_logs(tmp_path: Path) -> None:
+    """Of two logs of ten seconds, blocks of which are held out."""
+    found = asked(written(tmp_path / "logs", session("cogging", 2, 10.0)), tmp_path / "out")
     assert [(one.cause, one.joint) for one in found.result.findings] == [("cogging", 2)]
     assert found.result.findings[0].parameters["amplitude"].value == pytest.approx(0.28, rel=0.05)
-
-
-def test_without_a_name_the_nearest_explanations_are_told(rippled: Outcome[diagnose.Result]) -> None:
-    """Where nothing exceeded its threshold nothing was fitted, and first order tells: cogging, most of what joint 2 leaves."""
-    ledger = tuple(replace(one, exact_gain=math.nan, accepted=False) for one in rippled.result.candidate_causes)
-    result = replace(rippled.result, verdict="unknown", reason="it is far above its floor", findings=(), candidate_causes=ledger)
-    section = next(one for one in diagnose.report(result).sections if one.title == "Why there is no name")
-    assert "The nearest explanations, not named: cogging at joint 2 (" in section.text[0]
-    assert section.text[0].count("cogging at joint 2 (") == 1
-    assert section.text[1].startswith("The residual of joint 2 goes most with position (")  # cogging follows the joint's angle
-    assert section.text[0].count("% of the residual") == min(5, len({(one.cause, one.joint) for one in ledger if one.gain > 0.0}))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("cause", "joint"), [("torque_offset", 3), ("quadratic_drag", 1)])
-def test_other_causes_have_other_names(cause: str, joint: int, tmp_path: Path) -> None:
-    found = asked(written(tmp_path / "logs", session(cause, joint)), tmp_path / "out").result
-    assert [(one.cause, one.joint) for one in found.findings] == [(cause, joint)]
 
 
 @pytest.mark.slow
@@ -139,9 +116,8 @@ def test_paths_go_before_what_logs_say_of_themselves(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("settings", "words"), [
     ({"exclude": ("cogs",)}, "cogging"), ({"blocks": 1}, "1 block"),
-    ({"cutoff_hz": 0.0}, "low-pass"), ({"max_causes": 0}, "findings"), ({"min_speed": (-1.0,)}, "--min-speed"),
-    ({"min_speed": (math.nan,)}, "--min-speed"), ({"min_speed": (0.1, 0.2)}, "--min-speed: 2 values for 3 joints"),
-    ({"decimate": 0}, "--decimate"), ({"decimate": -3}, "--decimate"), ({"cutoff_hz": 450.0}, "sampled at 1000 Hz")])
+    ({"max_causes": 0}, "findings"), ({"min_speed": (0.1, 0.2)}, "--min-speed: 2 values for 3 joints"),
+    ({"decimate": 0}, "--decimate"), ({"cutoff_hz": 450.0}, "sampled at 1000 Hz")])
 def test_settings_that_make_no_sense_are_refused(settings: dict[str, object], words: str, tmp_path: Path,
                                                  monkeypatch: pytest.MonkeyPatch) -> None:
     """Before any log is examined, let alone simulated."""

@@ -15,8 +15,6 @@ from pipelines.estimation.joint_table import (
     Structure,
     Table,
     by_joint,
-    gains,
-    in_rows,
 )
 
 _ROWS, _JOINTS, _KNOWN, _MORE = 240, 3, 5, 2
@@ -66,27 +64,6 @@ def test_screening_is_what_an_exact_refit_with_the_candidate_gains(
     assert found.gain == pytest.approx(cost - together)
     assert found.amplitudes == pytest.approx(both[_KNOWN:])
     assert found.freedom == _MORE
-
-
-def test_columns_gain_on_any_signal_what_a_fit_of_it_gains_with_them(
-    rng: np.random.Generator,
-) -> None:
-    """Also on one that known columns explain; a column that they explain gains nothing."""
-    base, more, y, info, joint = _problem(rng)
-    info = 1e-9 * info
-    wide = np.zeros((_KNOWN + _MORE,) * 2)
-    wide[:_KNOWN, :_KNOWN] = info
-    signals = [y, rng.normal(size=_ROWS), base.sum(axis=0)]
-    every = np.concatenate([base, more])
-    wanted = [_least_cost(base, x, info)[0] - _least_cost(every, x, wide)[0] for x in signals]
-    b, c = (Table.of(x, joint, _JOINTS) for x in (base, more))
-    known = Arrow.of(info + b.gram(b), Structure.of(b))
-    split = [by_joint(x, joint, _JOINTS) for x in signals]
-    unit = c.scaled(1.0 / c.norms)
-    assert gains(unit, b, known, split) == pytest.approx(wanted, abs=1e-6)
-    twice = Table.of(np.concatenate([more / c.norms[:, None], base[:1] / b.norms[0]]), joint, _JOINTS)
-    assert gains(twice, b, known, split) == pytest.approx(wanted, abs=1e-6)
-    assert [in_rows(x, joint).tolist() for x in split] == [x.tolist() for x in signals]
 
 
 def test_a_block_is_predicted_as_by_a_fit_without_it(rng: np.random.Generator) -> None:

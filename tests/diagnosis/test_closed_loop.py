@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -48,24 +47,6 @@ def test_friction_that_grows_with_load_grows_with_friction_as_it_is() -> None:
 
 
 @pytest.mark.slow
-def test_lags_of_a_noisy_loop_are_no_causes_beside_a_drag() -> None:
-    """With ten times the noise, motion answered it: a delay of 21 ms and a lag of 23 ms had names, and there are none."""
-    case = drawn(41, 62)[-1]
-    found = diagnosed(*replace(case, noise=10.0 * case.noise).logs())
-    assert causes(found) == [("quadratic_drag", 1)]
-    assert effects(found)[0].values["coefficient"] > 0.0
-
-
-@pytest.mark.slow
-def test_a_lag_that_the_noise_of_a_loop_makes_too_is_neither_named_nor_denied() -> None:
-    """The drive is 4.4 ms late; fits made 5 ms of it with a second lag beside it."""
-    case = next(one for one in drawn(60, 1) if one.name == "table-torque_lag-1007")
-    found = diagnosed(*replace(case, noise=10.0 * case.noise).logs())
-    assert found.decision.verdict == "cannot-judge"
-    assert "torque_lag:1 may be the answer of the loop to noise" in found.decision.reason
-
-
-@pytest.mark.slow
 def test_friction_beside_a_payload_is_found_at_a_joint_that_the_payload_moves_far_more() -> None:
     """A payload acts as the rigid body does, exactly: 0.4 % of what it explains at joint 4 is more than the error of its law."""
     found = diagnosed(*pairs(4, 61)[-1].logs())
@@ -80,31 +61,6 @@ def test_a_torque_that_hops_is_no_delay_and_no_contact(seed: int, number: int) -
     found = diagnosed(*drawn(number, seed)[-1].logs())
     assert found.decision.verdict == "unknown"
     assert "wanders" in found.decision.reason
-
-
-@pytest.mark.slow
-def test_a_joint_that_loses_seven_tenths_of_its_viscous_friction_is_no_unknown() -> None:
-    """Of a gantry's first axis the fit stopped on the way: it took the friction for known while it fitted the drift."""
-    found = diagnosed(*drawn(25, 33)[-1].logs())
-    assert causes(found) == [("viscous_drift", 1)]
-    assert effects(found)[0].values["time_constant"] == pytest.approx(6.0, rel=0.02)
-
-
-@pytest.mark.slow
-def test_a_drift_is_a_share_of_all_the_viscous_friction() -> None:
-    """A form of friction without a name took a part of it: the drift of -.725 came out as -1.29, with a deviation of .015."""
-    found = diagnosed(*drawn(43, 42)[-1].logs())
-    assert causes(found) == [("viscous_drift", 3)]
-    assert effects(found)[0].values["relative_change"] == pytest.approx(-0.725, abs=0.01)
-
-
-@pytest.mark.slow
-def test_a_short_link_is_not_distinguished_from_a_long_next_one(tmp_path: Path) -> None:
-    """A SCARA shows the ratio of its links alone: link 1 by -23.3 mm was reported as link 2 by 17.7 mm, ± 0.1 mm."""
-    finding = finding_of(67010, tmp_path)
-    link = finding["parameters"]["link"]
-    assert finding["cause"] == "link_length"
-    assert abs(link["value"] - 1.0) < 2.0 * link["std"]
 
 
 @pytest.mark.slow

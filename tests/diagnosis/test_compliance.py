@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,13 +32,6 @@ def test_a_soft_base_is_named_with_its_frequency() -> None:
         assert np.ptp(level) < 0.1 * level.mean() < np.ptp(one.fitted)
 
 
-def test_without_responses_what_gives_way_is_not_testable() -> None:
-    assert compliance((), synthetic_arm()) is None
-    told = {one.cause: one for one in untold(None)}
-    assert set(told) == {"base_resonance", "joint_elasticity", "backlash"}
-    assert all("no frf log" in one.reason and one.record for one in told.values())
-
-
 @pytest.mark.slow
 def test_a_gap_is_told_from_a_spring_by_responses_alone() -> None:
     """Without them, and beside a spring, it has no name; where they show a rigid arm it has."""
@@ -49,21 +41,3 @@ def test_a_gap_is_told_from_a_spring_by_responses_alone() -> None:
     assert "Measure frequency responses" not in beside.record
     assert untold(Compliance((), "")) == ()
     assert "backlash" not in [one.cause for one in untold(None, ("backlash",))]
-
-
-def test_responses_of_no_use_are_said() -> None:
-    """A log in which v never moves anything answers nothing: the reason stands where the causes would."""
-    log = open_log(SAMPLES / "frf-1-1.h5").log
-    still = replace(log, signals={**log.signals, "v": replace(log.signals["v"], values=np.zeros_like(log.signals["v"].values))})
-    found = compliance([still], synthetic_arm())
-    assert found is not None
-    assert not found.named
-    assert {one.reason for one in untold(found)} == {found.open}
-    assert "frequency responses are of no use" in found.open
-
-
-@pytest.mark.slow
-def test_a_cause_left_out_is_not_named() -> None:
-    found = compliance([open_log(SAMPLES / f"frf-1-{posture}.h5").log for posture in (1, 2)], synthetic_arm(), ("base_resonance",))
-    assert found is not None
-    assert not found.named

@@ -170,13 +170,6 @@ def test_waves_of_a_rotor_have_whole_orders(mean: float) -> None:
     assert rotor({7.0: 0.05, 12.0: 0.014, 28.0: 0.03}, mean) == [7.0, 12.0, 28.0]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("order", [6.8, 8.25, 12.37])
-def test_behind_a_gear_an_order_is_what_it_is(order: float) -> None:
-    """However close to a whole one."""
-    assert rotor({order: 0.04}) == [pytest.approx(order, abs=0.01)]
-
-
 def wandering(seed: int, size: float, ripple: float = 0.0) -> ExperimentLog:
     """A rotor with a torque of `size` [N m] rms that follows nothing but chance and remembers itself for a sixth of a second, as
     what a model leaves of a recorded arm does; and a ripple of seven waves a turn."""
@@ -192,12 +185,3 @@ def wandering(seed: int, size: float, ripple: float = 0.0) -> ExperimentLog:
 @pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.slow) for s in (11, 21))])
 def test_a_torque_that_follows_nothing_has_no_name(seed: int) -> None:
     assert causes(diagnosed(wandering(seed, 0.01), cutoff_hz=40.0)) == []
-
-
-@pytest.mark.slow
-def test_a_ripple_is_found_beside_it() -> None:
-    """Of the same power: one of seven waves a turn, 0.014 N m, whose square is twice that of the wander."""
-    found = diagnosed(wandering(1, 0.01, 0.014), wandering(2, 0.01, 0.014), cutoff_hz=40.0)
-    assert causes(found) == [("cogging", 1)]
-    assert effects(found)[0].values["order"] == pytest.approx(7.0, rel=0.01)
-    assert effects(found)[0].values["amplitude"] == pytest.approx(0.014, rel=0.25)

@@ -84,13 +84,6 @@ def test_above_its_limit_a_cause_is_found(cause: str, joint: int, part: float) -
 
 
 @pytest.mark.slow
-def test_well_below_its_limit_it_is_not() -> None:
-    """The limit covers both signs: at 0.7 of it the worse one is not found."""
-    assert not all(named("torque_offset", 3, part) for part in (0.7, -0.7))
-    assert not named("cogging", 2, 0.4)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("cause", "joint"),
     [

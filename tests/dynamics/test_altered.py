@@ -9,7 +9,6 @@ import pytest
 from pipelines.dynamics.altered import (
     carry_over,
     gravity_torque,
-    masses_beyond,
     standard_of,
     tip_parameters,
     with_gravity,
@@ -99,40 +98,3 @@ def test_a_longer_link(loaded: Arm) -> None:
         assert fitted(longer, loaded, carried)[1] < 1e-9 * np.abs(wanted).max()
     with pytest.raises(ValueError, match="no joint beyond"):
         with_longer_link(body, loaded.n, 0.01)
-
-
-def test_masses_beyond_a_longer_link(arm: Arm) -> None:
-    """What a little more of a link changes, by Pinocchio, is that of the base parameters carried over, and of masses beyond it in
-    the directions given: of any bodies. None of the directions is superfluous."""
-    body, step, needed = rigid_body(arm.robot), 1e-4, 0
-    states = arm.states(SAMPLES, 5)
-    y = body.regressor(*states)
-    for link in range(1, arm.n):
-        place = arm.model.jointPlacements[link + 1]
-        before = place.translation.copy()
-        length = np.linalg.norm(before)
-        towards = before / length if arm.robot.convention == "urdf" and length > 0.0 else np.array([1.0, 0.0, 0.0])
-        missed, scale = [], 0.0
-        for seed in range(6):
-            arm.load(physical_links(arm.n, np.random.default_rng(seed)))
-            p, found = fitted(body, arm, torque_of(arm))[0], []
-            for by in (step, -step):
-                arm.model.jointPlacements[link + 1].translation = before + by * towards
-                longer = with_longer_link(body, link, by)
-                found.append(torque_of(arm) - longer.torque(*states, carry_over(body, longer) @ p))
-            arm.model.jointPlacements[link + 1].translation = before
-            missed.append(((found[0] - found[1]) / (2.0 * step)).ravel())
-            scale = max(scale, float(np.abs(torque_of(arm)).max()))
-        directions, table = masses_beyond(body, link), np.array(missed).T
-        columns = (y @ directions).reshape(len(table), -1)
-        assert np.abs(table - columns @ np.linalg.lstsq(columns, table, rcond=None)[0]).max() < 1e-5 * scale
-        assert np.linalg.matrix_rank(table, tol=1e-5 * scale * np.sqrt(table.size)) == directions.shape[1]
-        needed += directions.shape[1]
-    assert needed > 0
-
-
-def test_no_change_is_none(loaded: Arm) -> None:
-    """Carried over to the same arm, base parameters stay."""
-    body = rigid_body(loaded.robot)
-    np.testing.assert_allclose(carry_over(body, with_gravity(body, np.array(loaded.robot.gravity))), np.eye(len(body.parameters)),
-                               atol=1e-9)

@@ -91,15 +91,6 @@ def test_parts_add_up_and_mean_what_they_say(arm: Arm) -> None:
     np.testing.assert_allclose(body.torque_parts(q, 2.0 * dq, ddq, p).coriolis, 4.0 * parts.coriolis, atol=4.0 * atol)
 
 
-def test_mass_matrix_of_base_parameters_is_the_links(arm: Arm) -> None:
-    """D(q) from p alone equals D(q) from all link parameters, although most of these are not in p."""
-    phi = physical_links(arm.n, np.random.default_rng(47))
-    body = BaseArm(arm.robot)
-    q, _, _ = arm.states(50, seed=48)
-    theirs = serial.mass_matrix(body.chain, q, phi)
-    np.testing.assert_allclose(body.mass_matrix(q, body.base.combine @ phi), theirs, atol=2e-10 * np.abs(theirs).max())
-
-
 def test_the_set_does_not_depend_on_the_draw(arm: Arm) -> None:
     """Other random states choose the same parameters, in the same words."""
     chain = serial_chain(arm.robot)

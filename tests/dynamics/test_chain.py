@@ -88,32 +88,3 @@ def test_mass_matrix_equals_pinocchio(arm: Arm) -> None:
         theirs = theirs + np.triu(theirs, 1).T
         np.testing.assert_allclose(ours[k], theirs, atol=1e-12 * np.abs(theirs).max())
         assert np.linalg.eigvalsh(ours[k]).min() > 0.0
-
-
-def test_coriolis_torque_has_the_power_of_the_changing_mass_matrix(arm: Arm) -> None:
-    """dqᵀ c = ½ dqᵀ Ḋ dq: inertia forces only move kinetic energy around. Ḋ by differences along the motion."""
-    phi = physical_links(arm.n, np.random.default_rng(26))
-    q, dq, _ = arm.states(50, seed=27)
-    chain, h = serial_chain(arm.robot), 1e-3
-    c = serial.inverse_dynamics(chain, q, dq, np.zeros_like(q), phi, gravity=np.zeros(3))
-    energies = [np.einsum("si,sij,sj->s", dq, serial.mass_matrix(chain, q + k * h * dq, phi), dq)
-                for k in (-2, -1, 1, 2)]
-    rate = (energies[0] - 8.0 * energies[1] + 8.0 * energies[2] - energies[3]) / (12.0 * h)
-    np.testing.assert_allclose((dq * c).sum(axis=1), 0.5 * rate, atol=1e-7 * np.abs(rate).max())
-
-
-def test_acceleration_torque_is_the_mass_matrix(arm: Arm) -> None:
-    """At rest and without weight τ = D q̈, the recursion and the sum over links agreeing."""
-    phi = physical_links(arm.n, np.random.default_rng(28))
-    q, _, ddq = arm.states(200, seed=29)
-    chain = serial_chain(arm.robot)
-    tau = serial.inverse_dynamics(chain, q, np.zeros_like(q), ddq, phi, gravity=np.zeros(3))
-    d = serial.mass_matrix(chain, q, phi)
-    np.testing.assert_allclose(np.einsum("sij,sj->si", d, ddq), tau, atol=1e-12 * np.abs(tau).max())
-
-
-def test_a_joint_does_not_feel_the_links_before_it(arm: Arm) -> None:
-    """The regressor is block upper triangular."""
-    y = serial.regressor(serial_chain(arm.robot), *arm.states(10, seed=30))
-    for j in range(1, arm.n):
-        assert not y[:, j, :10 * j].any()

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from pipelines.dynamics.kinematics import Placement, forward_kinematics, serial_chain
+from pipelines.dynamics.kinematics import forward_kinematics, serial_chain
 from pipelines.errors import InputRejected
 from pipelines.io.robot import Joint, RobotDescription
 from pipelines.io.robot_files import load_robot
@@ -56,33 +55,10 @@ def test_frames_are_the_textbooks_products(convention: str, rows: list[tuple[str
         np.testing.assert_allclose(ours.position[k], theirs[:, :3, 3], atol=1e-14)
 
 
-def test_distal_and_modifiedtables_of_one_arm_agree() -> None:
-    """A distal table shifted by one row is the modified table of the same arm: the tips coincide."""
-    distal = replace(table("arm", "dh", SEVEN), tool=(0.0, 0.0, 0.0))
-    twists = [(0.0, 0.0)] + [(j.alpha, j.a) for j in distal.joints]
-    modified = replace(distal, convention="mdh", tool=(twists[-1][1], 0.0, 0.0), joints=tuple(
-        replace(j, alpha=alpha, a=a) for j, (alpha, a) in zip(distal.joints, twists[:-1], strict=True)))
-    q = np.random.default_rng(2).uniform(-3.0, 3.0, (50, 7))
-    np.testing.assert_allclose(forward_kinematics(serial_chain(distal), q).tip,
-                               forward_kinematics(serial_chain(modified), q).tip, atol=1e-14)
-
-
 def test_tip_of_the_paper_is_eq_A2() -> None:
     """The RRR arm stretched forwards reaches a2 + a3 ahead and d2 + d3 aside, at the height of its shoulder."""
     tip = forward_kinematics(serial_chain(load_robot("rrr")), np.zeros((1, 3))).tip[0]
     np.testing.assert_allclose(tip, [0.615, -0.259, 0.56], atol=1e-15)
-
-
-def test_a_twist_keeps_its_power_in_every_frame() -> None:
-    """Velocity of any point is the same whether the twist is about the old origin or about the new one."""
-    rng = np.random.default_rng(3)
-    rotation = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    place = Placement(rotation * np.sign(np.linalg.det(rotation)), rng.normal(size=3))
-    twist, point = rng.normal(size=6), rng.normal(size=3)
-    moved = place.twist_matrix @ twist
-    seen_from_old = twist[3:] + np.cross(twist[:3], place.rotation @ point + place.position)
-    seen_from_new = place.rotation @ (moved[3:] + np.cross(moved[:3], point))
-    np.testing.assert_allclose(seen_from_new, seen_from_old, atol=1e-14)
 
 
 _ONE = ('<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute"><parent link="a"/>'

@@ -14,7 +14,7 @@ import pytest
 from bench.plant import as_log
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.effects.base import Effect
-from pipelines.effects.bodies import GravityTilt, LinkLength
+from pipelines.effects.bodies import LinkLength
 from pipelines.effects.contact import Contact
 from pipelines.io.log import Array
 from pipelines.simulation import Experiment, Plant, run
@@ -37,7 +37,8 @@ SHARE = 0.02  # of what a fault does to the torque may stay unexplained, beside 
 
 CASES = (("cogging", 2), ("viscous_drift", 1), ("torque_gain", 3), ("torque_saturation", 2), ("torque_crosstalk", 3),
          ("drive_lag", 1), ("torque_lag", 2), ("transmission_coupling", 3), ("payload", None), ("contact", None),
-         ("spring", 1), ("gravity_tilt", None), ("link_length", None))
+         ("spring", 1), ("gravity_tilt", None), ("link_length", None), ("torque_offset", 3), ("load_friction", 2),
+         ("quadratic_drag", 1), ("rotor_inertia", 3))
 LONG = (("contact", None), ("gravity_tilt", None))  # simulated for longer
 NO_MOTION = {"torque_lag"}  # it changes the log, not what the arm does
 NO_OPPOSITE = {"torque_saturation", "link_length", "payload"}  # a limit is positive; what fits of base parameters tell has no sign
@@ -159,12 +160,3 @@ def test_a_touch_is_looked_for_where_it_was() -> None:
     shared = [min(begin + lasting, one.start + one.duration) - max(begin, one.start)
               for one in Contact().promising(motion, arm(), tau - arm().torque(motion))]
     assert max(shared) > 0.66 * lasting
-
-
-def test_a_level_arm_tells_nothing_of_its_waist() -> None:
-    """The two further amplitudes of a tilt act on joint 1 alone, and only where it stands upright."""
-    motion, _ = motion_and_torque(healthy())
-    columns = GravityTilt().columns(motion, arm())
-    assert not columns[:, 1:, 2:].any()
-    leaning = replace(machine().robot, gravity=(9.81, 0.0, 0.0))
-    assert not GravityTilt().columns(motion, Arm.from_links(leaning))[:, :, 2:].any()

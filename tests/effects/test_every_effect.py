@@ -11,7 +11,7 @@ import pytest
 
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Array, Motion
-from pipelines.effects import all_effects, effect_names, find_effect
+from pipelines.effects import all_effects, effect_names
 from pipelines.effects.base import Effect, FrictionLaw, adds, everywhere
 from pipelines.effects.parameters import causes
 from sample_logs.make_model import synthetic_arm
@@ -137,26 +137,6 @@ def test_time_counts_from_the_start_of_the_log(kind: type[Effect], arm: Arm, mot
             np.testing.assert_allclose(there, here, rtol=1e-6, atol=1e-6 * np.abs(here).max())
 
 
-@pytest.mark.parametrize(("cause", "values"), [
-    ("contact", {"start": 0.8, "duration": 0.3, "force": 5.0, "force_x": 0.0, "force_y": 3.0, "force_z": 4.0}),
-    ("viscous_drift", {"relative_change": 0.5, "time_constant": 0.7})])
-def test_a_simulation_counts_time_from_the_start_of_the_log_as_well(cause: str, values: dict[str, float], arm: Arm,
-                                                                    motion: Motion) -> None:
-    """A run from any sample on knows when the log began: its load is the torque that the log shows there."""
-    later = replace(motion, t=motion.t + 300.0)
-    effect = placed(find_effect(cause)).at(values)
-    hooks = effect.simulate(arm, values)
-    assert hooks.load is not None
-    assert hooks.start is not None
-    first = Motion(later.t[:1], motion.q[:1], motion.dq[:1], motion.ddq[:1])
-    states = np.repeat(hooks.start(first, np.zeros((1, 3))), 400, axis=0)
-    some = slice(700, 1100)
-    part = Motion(later.t[some], motion.q[some], motion.dq[some], motion.ddq[some])
-    expected = effect.torque(motion, arm, values)[some]
-    assert np.abs(expected).max() > 0.0
-    np.testing.assert_allclose(hooks.load(part, states), expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
-
-
 @every_effect
 def test_values_and_amplitudes_are_one(kind: type[Effect]) -> None:
     """From values to shape and amplitudes and back."""
@@ -205,15 +185,6 @@ def test_apply(kind: type[Effect], arm: Arm, motion: Motion) -> None:
     assert np.abs(change - expected).max() <= (1e-9 if linear else 0.05) * np.abs(expected).max()
     model = arm.extended(Acting.of(effect, values))
     np.testing.assert_allclose(model.torque(motion), effect.apply(motion, arm, values), rtol=1e-12, atol=1e-12)
-
-
-@every_effect
-def test_apply_goes_around_what_it_is_given(kind: type[Effect], arm: Arm, motion: Motion) -> None:
-    """`predict` is used, so that effects can be put one around the other."""
-    effect = placed(kind)
-    none = without_amplitude(effect, drawn(effect, 4))
-    shifted = effect.apply(motion, arm, none, lambda m, a: a.torque(m) + 1.0)
-    np.testing.assert_array_equal(shifted, arm.torque(motion) + 1.0)
 
 
 @every_friction_law

@@ -48,10 +48,3 @@ def test_a_gap_is_crossed_as_an_integrator_crosses_it(gap: int, force: Callable[
     off = np.abs(x - motion(gap, t, force)) / (2.0 * GAPS.half[gap])
     assert off.max() < 0.05
     assert np.median(off) < 2e-3
-
-
-def test_gaps_of_one_motor_are_followed_as_if_alone() -> None:
-    t: Array = np.arange(3000, dtype=np.float64) / 2000.0
-    mass, force = np.full((1, len(t)), 0.3), pulled(t)[None]
-    together = followed(t, np.tile(mass, (3, 1)), np.tile(force, (3, 1)), GAPS)
-    np.testing.assert_array_equal(followed(t, mass, force, GAPS), together)

@@ -6,9 +6,9 @@ low-pass, as they do before any fit.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ from bench.plant import Recording, as_log
 from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Motion
 from pipelines.effects import find_effect
-from pipelines.effects.base import ArmModel, Effect, Hooks, Parameters, Values, Words
+from pipelines.effects.base import Effect
 from pipelines.effects.encoders import EncoderCrosstalk, EncoderEccentricity, TimeDelay
 from pipelines.effects.soft import JointElasticity
 from pipelines.io.log import Array, Controller
@@ -111,13 +111,6 @@ def test_the_closed_loop_does_what_the_faulty_machine_does(name: str, joint: int
     assert simulated_apart(effect, values, name, joint) <= 5e-3
 
 
-@pytest.mark.parametrize(("name", "joint", "apart"), [("joint_elasticity", 2, 1e-6), ("backlash", 1, 0.08), ("backlash", 2, 0.08)])
-def test_motor_and_link_move_as_the_faulty_machines_do(name: str, joint: int, apart: float) -> None:
-    """Started with the bench's jump. The teeth of its gap are another's than ours, and so is how they bounce."""
-    effect, values = sealed(name, joint)
-    assert simulated_apart(Jumping(inner=effect, numbers=values), {}, name, joint) <= apart
-
-
 def simulated_apart(effect: Effect, values: dict[str, float], name: str, joint: int | None) -> float:
     """Of what the fault does to the position, the share that the simulation has otherwise."""
     recording = faulty(name, joint)
@@ -127,27 +120,6 @@ def simulated_apart(effect: Effect, values: dict[str, float], name: str, joint: 
     made = rms((recording.q - healthy().q)[:SIMULATED])
     assert made > 1e-6
     return rms(found.q[0] - recording.q[:SIMULATED]) / made
-
-
-@dataclass(frozen=True)
-class Jumping(Effect):
-    """An effect whose motor and link start at the same angle, whatever they carry."""
-
-    name = "jumping"
-    scope = "arm"
-    parameters: ClassVar[Parameters] = Parameters()
-    words = Words("Jumping", *["none"] * 4)
-    inner: Effect | None = None
-    numbers: dict[str, float] | None = None
-
-    def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        return np.zeros((*motion.q.shape, 0))
-
-    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
-        assert self.inner is not None
-        assert self.numbers is not None
-        own, hooks = self.inner.own, self.inner.simulate(arm, self.numbers)
-        return replace(hooks, settled=None, start=lambda motion, tau: np.stack([0.0 * own(motion.q), own(motion.dq)], axis=-1))
 
 
 def held(*acting: Acting) -> tuple[Array, Array]:
@@ -199,14 +171,3 @@ def test_columns_are_the_slope_of_the_exact_form(effect: Effect, values: dict[st
     ahead, behind = (effect.apply(motion, arm(), values | {strength: sign * size}) for sign in (1.0, -1.0))
     columns = effect.columns(motion, arm()) @ effect.amplitudes(values)
     assert np.abs((ahead - behind) / (2.0 * size) - columns).max() <= 1e-5 * np.abs(columns).max()
-
-
-def test_an_elastic_joints_frequency_follows_its_stiffness() -> None:
-    """Of what was scanned on a motion: √(k/J)/2π with J what the joint feels on average less the motor."""
-    motion, _ = _read(healthy())
-    felt = float(np.mean(arm().body.mass_matrix(motion.q[::7], arm().p)[:, 1, 1]))
-    for effect in JointElasticity(2).shapes(motion, arm()):
-        k = 14000.0
-        found = effect.values([1.0 / k])
-        link = felt - found["motor_inertia"]
-        assert found["frequency"] == pytest.approx(np.sqrt(k / link) / (2.0 * np.pi), rel=0.01)

@@ -60,10 +60,3 @@ def test_the_surrogate_bounds_the_condition_number_and_closes_in() -> None:
     assert found.condition == pytest.approx(np.exp(truth), rel=1e-10)
     assert values == sorted(values, reverse=True)
     assert truth <= values[-1] <= truth + np.log(8) / 600
-
-
-def test_large_powers_do_not_overflow() -> None:
-    """Eigenvalues twelve decades apart at p = 4000."""
-    value, gradient = condition(spectrum(np.diag(np.logspace(-6, 6, 5))), 4000.0)
-    assert value == pytest.approx(0.5 * np.log(1e12), rel=1e-6)
-    assert np.isfinite(gradient).all()

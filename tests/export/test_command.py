@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from pipelines import estimate_bps
-from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import RrridError, UsageError
 from pipelines.export_model import STAGE, Card, Settings
 from pipelines.io.files import write_log
@@ -127,39 +126,3 @@ def test_nothing_is_written_of_what_is_refused(settings: Settings, kind: type[Rr
         export(tmp_path, settings)
     assert problem.value.remedy
     assert not (tmp_path / "out").exists()
-
-
-def test_what_the_logs_do_not_tell_is_not_known_exactly(tmp_path: Path) -> None:
-    """Null instead of a variance of zero, in covariance.json and in the table, and both say what null is."""
-    outcome = export(tmp_path, Settings(str(undescribed(tmp_path, std=0.01)), "json"))
-    rows = [row for row in json.loads((outcome.folder / "rrr-synthetic.json").read_text())["table"] if row["of"] == "link"]
-    _, covariance = read_covariance(outcome.folder / "covariance.json")
-    untold = np.array(["logs" not in row["origin"] for row in rows])
-    assert {"assumed", "description", "logs"} <= {row["origin"] for row in rows}
-    assert np.isnan(covariance[untold]).all()
-    assert np.isnan(covariance[:, untold]).all()
-    assert np.isfinite(covariance[np.ix_(~untold, ~untold)]).all()
-    assert [row["std"] is None for row in rows] == untold.tolist()
-    for name in ("covariance.json", "rrr-synthetic.json"):
-        assert "not told by the logs" in json.loads((outcome.folder / name).read_text())["null"]
-
-
-def test_a_model_without_inertia_says_what_to_measure(tmp_path: Path) -> None:
-    """The model.json of fit-friction has no links."""
-    arm = synthetic_arm()
-    base = tuple(replace(p, value=0.0) for p in arm.base)
-    write_model(tmp_path / "model.json", replace(arm, base=base).to_model())
-    with pytest.raises(UsageError, match="friction alone") as problem:
-        export(tmp_path, Settings(str(tmp_path / "model.json")))
-    assert "excitation" in problem.value.remedy
-    assert not (tmp_path / "out").exists()
-
-
-def undescribed(folder: Path, std: float | None = None, **values: float) -> Path:
-    """The model.json of the synthetic arm whose shoulder nobody describes, with these base parameters."""
-    arm = synthetic_arm()
-    joints = tuple(replace(joint, link=None) if k == 1 else joint for k, joint in enumerate(arm.robot.joints))
-    base = tuple(replace(p, value=values.get(p.name, p.value), std=std) for p in arm.base)
-    body = rigid_body(replace(arm.robot, joints=joints))
-    write_model(folder / "model.json", replace(arm, body=body, base=base).to_model())
-    return folder / "model.json"

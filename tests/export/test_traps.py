@@ -36,29 +36,19 @@ WEIGHT = """<link name="gripper"><inertial><origin xyz="0.02 0 0.01" rpy="0.3 0 
 SWAPPED = PLAIN.replace('<joint name="shoulder"', '<joint name="zz"').replace('<joint name="elbow"', '<joint name="aa"')
 HEAD, *JOINTS = SWAPPED.split("  <joint ")
 CARRIED = {
-    "plain": PLAIN,
     "fixed link with mass at the tip": PLAIN.replace("</robot>", WEIGHT.replace("PARENT", "lower")),
-    "fixed link with mass in the middle": PLAIN.replace("</robot>", WEIGHT.replace("PARENT", "upper")),
     "joints in another order": f"{HEAD}  <joint {JOINTS[1].replace('</robot>', '')}  <joint {JOINTS[0]}</robot>",
     "mirrored axis": PLAIN.replace('<axis xyz="0 1 0"/><limit lower="-1"', '<axis xyz="0 -1 0"/><limit lower="-1"'),
-    "axis of another length": PLAIN.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 2 0"/>'),
     "skew axis": PLAIN.replace('<axis xyz="0 1 0"/><limit lower="-1"', '<axis xyz="0.48 0.6 0.64"/><limit lower="-1"'),
     "prismatic joint": PLAIN.replace('name="elbow" type="revolute"', 'name="elbow" type="prismatic"'),
-    "inertia in axes of its own": PLAIN.replace('<origin xyz="0.1 0 0.03"/>', '<origin xyz="0.1 0 0.03" rpy="0.5 -0.4 0.3"/>'),
     "products of inertia": PLAIN.replace('izz="0.01" ixy="0" ixz="0" iyz="0"', 'izz="0.01" ixy="0.001" ixz="-0.002" iyz="0.0015"'),
     "pitch of ninety degrees": PLAIN.replace('rpy="0 0.1 0"', 'rpy="0.4 1.5707963267948966 0.2"'),
-    "pitch of nearly ninety degrees": PLAIN.replace('rpy="0 0.1 0"', 'rpy="0.4 1.57079632 0.2"'),
     "no limits": re.sub(r'"revolute"(.*?)<limit [^>]*/>', r'"continuous"\1', PLAIN, flags=re.DOTALL),
-    "mass on the base": PLAIN.replace('<link name="base"/>', '<link name="base"><inertial><mass value="90"/>'
-                                      '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'),
     "names with characters of XML": PLAIN.replace('name="elbow"', 'name="a&amp;&quot;b&lt;"'),
 }
 # Read, and a note of the card says what was made of it.
 TOLD = {
     "names with spaces": (PLAIN.replace('name="elbow"', 'name="elbow joint"'), "'elbow joint' is called 'elbow_joint'"),
-    "two names that differ by a blank": (PLAIN.replace('name="elbow"', 'name="el bow"').replace('name="shoulder"', 'name="el_bow"'),
-                                         "'el bow' is called 'el_bow_2'"),
-    "a root called world": (PLAIN.replace('"base"', '"world"'), "'world' is called 'world_link'"),
     "a fixed link on the way": (PLAIN.replace('<parent link="upper"/>', '<parent link="bracket"/>').replace(
         "</robot>", '<link name="bracket"/><joint name="glue" type="fixed"><parent link="upper"/><child link="bracket"/>'
         '<origin xyz="0 0.1 0" rpy="0 0 0.3"/></joint></robot>'), "merged into them: bracket"),
@@ -66,11 +56,9 @@ TOLD = {
 }
 REFUSED = {
     "mimic joint": (PLAIN.replace('velocity="4"/>', 'velocity="4"/><mimic joint="shoulder"/>'), "mimic of another"),
-    "planar joint": (PLAIN.replace('name="elbow" type="revolute"', 'name="elbow" type="planar"'), "planar"),
     "two fingers": (PLAIN.replace("</robot>", "".join(
         f'<link name="{side}"/><joint name="{side}" type="prismatic"><parent link="lower"/><child link="{side}"/>'
         '<limit lower="0" upper="1" effort="1" velocity="1"/></joint>' for side in ("left", "right")) + "</robot>"), "branch off"),
-    "negative mass": (PLAIN.replace('<mass value="1"/>', '<mass value="-1"/>'), "negative mass"),
 }
 
 

@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from scipy.stats import binomtest
 
 from benchmarks.hidden_effects.cases import FAMILIES, Hidden, SealedCase, campaign
 from benchmarks.hidden_effects.judge import judge, scores_in, tasks
 from benchmarks.hidden_effects.make import Sealed
 from benchmarks.hidden_effects.score import score
-from benchmarks.hidden_effects.table import Row, rows, wilson
+from benchmarks.hidden_effects.table import Row, rows
 from benchmarks.hidden_effects.verdict import read_verdict
 from tests.hidden_effects.answers import (
     Engine,
@@ -62,30 +61,6 @@ def test_what_no_candidate_describes_is_unknown() -> None:
     assert judged(truth, answer(verdict="unknown")).right
     assert not judged(truth, answer()).right
     assert judged(truth, answer(finding("presliding", 2))).wrong == 1
-
-
-def test_a_payload_is_weighed_within_three_percent() -> None:
-    truth = case("payload", None, "payload")
-    for share, right in ((1.02, True), (1.04, False)):
-        mass = {"mass": share * truth.findings[0]["parameters"]["mass"]}
-        assert judged(truth, answer(finding("payload", None, mass, std=1.0))).right == right
-
-
-@pytest.mark.parametrize(("factor", "std", "agrees"),
-                         [(1.04, 0.0, True), (1.06, 0.0, False), (1.06, 0.01, True), (-1.0, 0.0, False)])
-def test_an_offset_agrees_within_five_percent_or_three_std(factor: float, std: float, agrees: bool) -> None:
-    """0.28 N m: 6 % are 17 mN m, less than three standard deviations of 10."""
-    truth = case("torque_offset")
-    (_, ok), = judged(truth, answer(finding("torque_offset", 2, {"offset": factor * truth.findings[0]["parameters"]["offset"]},
-                                            std=std))).parameters
-    assert ok == agrees
-
-
-@pytest.mark.parametrize(("count", "of"), [(0, 20), (19, 20), (57, 60), (1, 100)])
-def test_wilsons_interval(count: int, of: int) -> None:
-    """As scipy has it."""
-    expected = binomtest(count, of).proportion_ci(0.95, "wilson")
-    assert wilson(count, of) == pytest.approx((expected.low, expected.high), abs=1e-4)
 
 
 @pytest.fixture(scope="module")

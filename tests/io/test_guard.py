@@ -9,7 +9,6 @@ import subprocess
 import sys
 import threading
 import time
-import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,8 +16,6 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.importers.tables import read_table
-from pipelines.io import files
 from pipelines.io.files import open_log, write_log
 from pipelines.io.sandbox import Answer, guarded
 from tests.cli.commands import REPO
@@ -49,60 +46,6 @@ def test_a_file_that_harms_its_reader_is_refused(tmp_path: Path, work: Callable[
         guarded(work, tmp_path / "a", seconds=1.0)
     assert time.monotonic() - began < 3.0
     assert guarded(lambda: Answer({"n": 1}, {}), tmp_path / "a").about == {"n": 1}
-
-
-def test_a_fault_of_the_reader_itself_is_told(tmp_path: Path) -> None:
-    (tmp_path / "a").write_bytes(b"x")
-
-    def stumble() -> Answer:
-        raise KeyError("a fault of its own")
-
-    with pytest.raises(RuntimeError, match="a fault of its own"):
-        guarded(stumble, tmp_path / "a")
-
-
-@pytest.mark.row("X05")
-def test_an_endless_text_is_refused(tmp_path: Path) -> None:
-    """X05: more than a description can have, without the memory for it."""
-    (tmp_path / "a").write_bytes(b"x")
-    tracemalloc.start()
-    try:
-        with pytest.raises(InputRejected, match="RRID-X05"):
-            guarded(lambda: Answer({"text": "x" * (40 << 20)}, {}), tmp_path / "a")
-        assert tracemalloc.get_traced_memory()[1] < 8 << 20
-    finally:
-        tracemalloc.stop()
-
-
-@pytest.mark.row("F14")
-@pytest.mark.parametrize("harm", ["refuse", "crash"])
-def test_a_file_that_is_written_while_it_is_read_is_not_called_damaged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                                                      harm: str) -> None:
-    """Half of it is old, half new: whatever the library makes of that, it is told to wait."""
-    write_log(tmp_path / "a.h5", small_log())
-
-    def meddled(*_: object) -> Answer:
-        with (tmp_path / "a.h5").open("ab") as file:
-            file.write(b"more")
-        if harm == "crash":
-            _crash()
-        raise InputRejected("F02", "damaged", where="", remedy="copy it again")
-
-    monkeypatch.setattr(files.hdf5, "read_parts", meddled)
-    with pytest.raises(InputRejected, match="RRID-F14"):
-        open_log(tmp_path / "a.h5")
-
-
-@pytest.mark.row("F08")
-@pytest.mark.parametrize("about", [{}, {"names": ["a"]}, {"names": [], "text": {}, "groups": {}, "checks": []}])
-def test_a_recording_that_is_none_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, about: dict[str, object]) -> None:
-    """F08, as of any damaged MAT file."""
-    import scipy.io
-
-    scipy.io.savemat(tmp_path / "a.mat", {"q": np.zeros((50, 3))})
-    monkeypatch.setattr("pipelines.importers.tables.guarded", lambda work, path: Answer(about, {}))
-    with pytest.raises(InputRejected, match="RRID-F08"):
-        read_table(tmp_path / "a.mat")
 
 
 def test_samples_of_every_shape_come_as_they_are(tmp_path: Path) -> None:

@@ -42,7 +42,6 @@ def test_a_choice_reaches_samples_controller_posture_and_joint() -> None:
 
 @pytest.mark.parametrize(("joints", "words"), [
     ((0, 1), "a log with 3 joints has no joint 0"), ((4,), "a log with 3 joints has no joint 4"),
-    ((5, 4), "no joint 5 or 4"), ((1, 1), "'1,1' names a joint twice"),
     ((1, 2), "2 joints are chosen, but the log describes a robot of 3.*--robot"), ((2,), "1 joint is chosen, but")])
 def test_a_choice_that_cannot_be_is_refused(joints: tuple[int, ...], words: str) -> None:
     """C02: joints that are not there; and a serial arm cannot lose a joint from its description."""

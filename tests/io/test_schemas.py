@@ -64,9 +64,7 @@ def test_a_result_of_every_kind_of_field() -> None:
 
 
 @pytest.mark.parametrize("spoil", [
-    lambda r: r.pop("pair"), lambda r: r.update(more=1), lambda r: r.update(command="other"), lambda r: r.update(left_out=1),
-    lambda r: r["parts"][0].update(kind="c"), lambda r: r["parts"][0].update(x="1"), lambda r: r["pair"].append(1),
-    lambda r: r["table"].update(p=3), lambda r: r.update(verdict=3), lambda r: r["parts"][1].update(rms={"$series": 1})])
+    lambda r: r.pop("pair"), lambda r: r.update(more=1), lambda r: r["parts"][0].update(kind="c"), lambda r: r["pair"].append(1)])
 def test_what_is_not_written_is_not_valid(spoil: Any) -> None:
     """A field missing, unknown, or of another kind."""
     wrong = copy.deepcopy(stored(GOOD))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import os
 from pathlib import Path
@@ -161,9 +160,6 @@ def test_every_document_type_is_refused(tmp_path: Path, text: str | bytes) -> No
 @pytest.mark.parametrize("text", [
     '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="/etc/passwd"/></robot>',
     _robot(_joint("j", "a", "b", inside='<origin xyz="${length} 0 0"/>'), links="ab"),
-    _robot(_joint("j", "a", "b", inside='<origin xyz="$(arg x) 0 0"/>'), links="ab"),
-    _robot(_joint("j", "a", "b", inside='<limit lower="${-pi}" upper="1"/>'), links="ab"),
-    _robot(_joint("${prefix}j", "a", "b"), links="ab"),
 ])
 def test_xacro_is_refused_with_the_way_out(tmp_path: Path, text: str) -> None:
     """A macro file is never run; the message says how to expand it."""
@@ -180,34 +176,19 @@ def test_huge_and_deep_files_are_refused(tmp_path: Path) -> None:
 
 # what is malformed
 
-_CYCLE = _robot(_joint("j0", "d", "a"), _joint("j1", "a", "b"), _joint("j2", "b", "c"), _joint("j3", "c", "b"), links="abcd")
-
 
 @pytest.mark.parametrize(("text", "words"), [
     ("<robot", "not well-formed"), ("", "not well-formed"), (b"\xff\xfe\x00", "not well-formed"),
-    ('<?xml version="1.0" encoding="no-such"?><robot/>', "not well-formed"), ("<sdf/>", "an SDF model"),
-    ("<arm/>", "<arm>, not <robot>"),
     ("<robot/>", "hangs"), (_robot(links="ab"), "a, b hang on nothing"), (_robot(links="a"), "no joint moves"),
     (_robot(_joint("j", "a", "nope"), links="ab"), "'nope', which is not defined"),
     (_robot(_joint("j", "a", "b"), _joint("j", "b", "c")), "two joints are called 'j'"),
-    (_robot(links="aa"), "two links are called 'a'"), (_CYCLE, "closed loop"),
-    (_robot(_joint("j", "a", "a"), _joint("k", "b", "c")), "closed loop"),
-    (_robot(_joint("j", "a", "b"), _joint("k", "b", "a"), links="ab"), "every link hangs on another"),
     (_robot(_joint("j", "a", "b", "ball"), links="ab"), "type 'ball'"),
-    (_robot(_joint("j", "a", "b", "floating"), links="ab"), "is floating"),
     (_robot(_joint("j", "a", "b", "planar"), links="ab"), "is planar"),
     (_robot(_joint("j", "a", "b", inside='<mimic joint="k"/>'), links="ab"), "is a mimic"),
-    (_robot(_joint("j", "a", "b", "fixed"), links="ab"), "no joint moves"),
     (_robot(_joint("j", "a", "b", inside='<axis xyz="0 0 0"/>'), links="ab"), "axis without direction"),
-    (_robot(_joint("j", "a", "b", inside='<axis xyz="0 1"/>'), links="ab"), "three numbers, not 2"),
-    (_robot(_joint("j", "a", "b", inside='<origin xyz="0 nan 0"/>'), links="ab"), "not finite"),
     (_robot(_joint("j", "a", "b", inside='<origin xyz="0 1e300 0"/>'), links="ab"), "absurdly large"),
-    (_robot(_joint("j", "a", "b", inside='<origin xyz="0 1_0 0"/>'), links="ab"), "not a number"),
-    (_robot(_joint("j", "a", "b", inside='<origin xyz="0 0,1 0"/>'), links="ab"), "'0 0,1 0', which is not a number"),
     (_robot(_joint("j", "a", "b", inside='<limit lower="2" upper="1"/>'), links="ab"), "lower above upper"),
-    (_robot(_joint("j", "a", "b", inside='<limit velocity="-1"/>'), links="ab"), "negative velocity"),
     (_robot('<joint name="j" type="revolute"><parent link="a"/></joint>'), "lacks its parent or child"),
-    (_robot('<joint type="revolute"/>'), "<joint> has no name"),
     (_robot('<link name="d"><inertial><mass value="-1"/></inertial></link>', _joint("j", "a", "d"), links="a"),
      "negative mass"),
 ])
@@ -219,18 +200,3 @@ def test_malformed_urdfs_are_refused_in_words(tmp_path: Path, text: str | bytes,
     if isinstance(text, str) and "mass" not in text:  # a log's kinematics hold no inertials
         with pytest.raises(InputRejected):
             chain_from_urdf(text)
-
-
-def test_an_unknown_tip_is_named_with_the_nearest(tmp_path: Path) -> None:
-    """A slip in tip_link is answered with the link that was meant."""
-    problem = _refused(tmp_path, TWO.replace('"c"', '"flange"'), "flnge")
-    assert problem.code == "RRID-C02"
-    assert "did you mean 'flange'" in problem.message
-
-
-@given(st.integers(0, len(TWO) - 1), st.binary(min_size=1, max_size=3))
-def test_damaged_text_never_raises_anything_else(at: int, junk: bytes) -> None:
-    """Whatever bytes land in the text, the answer is a chain or a rejection."""
-    damaged = (TWO[:at].encode() + junk + TWO[at + len(junk):].encode()).decode("utf-8", "replace")
-    with contextlib.suppress(InputRejected):  # anything else is an error of ours
-        assert len(chain_from_urdf(damaged).joints) >= 1

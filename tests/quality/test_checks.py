@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
-from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 
-from pipelines.io.files import Opened
 from pipelines.io.limits import sentinels
-from pipelines.quality.checks import CHECKS, LogCheck, Subject, check_log, check_together
+from pipelines.quality.checks import CHECKS, LogCheck, Subject, check_log
 from pipelines.quality.segments import quantum, spikes, time_base
 from tests.faulty import turning
 from tests.healthy import (
@@ -45,20 +40,6 @@ def test_every_check_says_what_it_measured() -> None:
     assert codes == {"T07", "S08", "T01", "T02", "T03", "T04", "T05", "T09", "D01", "D03", "D04", "D05", "D06", "D07",
                      "D08", "S05", "S07", "D12",
                      "S16", "D11", "D10"}
-
-
-def test_what_is_measured_has_a_unit() -> None:
-    """Torque, encoder steps, speed, acceleration and travel of every joint, those of a slide in its own."""
-    said = {c.code: c.message for c in check_log(good_log())}
-    assert re.search(r"at most [0-9.]+, [0-9.]+, [0-9.]+ N m$", said["RRID-D05"])
-    assert re.search(r"speed at most .*[0-9] rad/s, acceleration .*[0-9] rad/s²$", said["RRID-D12"])
-    assert said["RRID-D08"].endswith(" rad")
-    assert " rad of travel" in said["RRID-S07"]
-    log = good_log()
-    first, *others = log.robot.joints
-    joints = (replace(first, type="prismatic"), *others)
-    slides: Any = SimpleNamespace(robot=replace(log.robot, joints=joints), n_joints=3)
-    assert Subject(slides).with_units("ddq_ref", (1.0, None, 2.5)) == "1 m/s², not visible, 2.5 rad/s²"
 
 
 def test_a_planned_log_has_no_sensors_to_judge() -> None:
@@ -138,15 +119,3 @@ def test_a_joint_that_spins_for_ever_is_not_in_degrees() -> None:
     log = make_log(turning(4.0, 0), "free", duration=10.0)
     assert float(np.ptp(log.q[:, 0])) > 4 * np.pi
     assert not any(c.code == "RRID-S07" and c.level != "ok" for c in check_log(log))
-
-
-def opened(log: object, name: str, sha: str) -> Opened:
-    return Opened(Path("folder") / name, sha, log, ())  # type: ignore[arg-type]
-
-
-def test_a_log_that_fits_and_judges_is_a_leak() -> None:
-    """D14, whatever the container: the same samples as identify and as validate."""
-    one, other = good_log(), replace(good_log(), role="validate", name="other")
-    found = check_together([opened(one, "a.h5", "1"), opened(other, "b.parquet", "2")], [Subject(one), Subject(other)])
-    assert [(c.code, c.level) for c in found] == [("RRID-D14", "reject")]
-    assert "leak" in found[0].message

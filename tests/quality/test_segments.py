@@ -24,13 +24,6 @@ def test_no_healthy_sample_is_lost(log) -> None:  # type: ignore[no-untyped-def]
     assert usable(log).fit.all()
 
 
-@pytest.mark.parametrize("row", ["S08 ms", "S08 us", "S08 ns"])
-def test_time_runs_in_seconds(row: str) -> None:
-    good = usable(MAKE[row](good_log()))
-    np.testing.assert_allclose(good.log.t, good_log().t, rtol=1e-12, atol=1e-12)
-    assert good.runs == (slice(0, 6000),)
-
-
 def test_a_clock_set_back_splits_the_log() -> None:
     assert usable(MAKE["T01"](good_log())).runs == (slice(0, 3000), slice(3000, 6000))
 
@@ -45,7 +38,7 @@ def test_dropped_samples_do_not_split_and_gaps_do() -> None:
 
 def test_fillers_and_infinities_become_missing() -> None:
     """Nothing that is left is not finite, and nothing is a filler."""
-    for row in ("D03 inf", "D03 huge", "D03 filler"):
+    for row in ("D03 inf", "D03 filler"):
         good = usable(MAKE[row](good_log()))
         assert np.isfinite(good.log.q[good.fit]).all()
         assert np.isfinite(good.log.tau[good.fit]).all()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import fields
 from typing import Any
@@ -14,7 +13,6 @@ from pipelines.diagnosis.result import (
     Alternative,
     Finding,
     Gain,
-    Rejected,
     ResidualRms,
     Result,
     Value,
@@ -25,10 +23,7 @@ from pipelines.report.diagnosis_finding import (
     finding_section,
     numbers_section,
 )
-from pipelines.report.diagnosis_report import torque_errors
-from pipelines.report.words import (
-    together,
-)
+from pipelines.report.diagnosis_report import diagnosis_report
 
 KEY = re.compile(r"[a-z]+_[a-z0-9]+|\b[a-z]+:\d")
 COMMAND = re.compile(r'"rrrid [^"]*"')
@@ -63,28 +58,10 @@ def test_a_finding_is_told_in_words(cause: str) -> None:
         assert all((unit, meaning))
 
 
-def test_one_cause_at_several_joints_is_told_once() -> None:
-    """Three joints with Stribeck friction need no advice three times."""
-    places = (("stribeck", 1), ("payload", None), ("stribeck", 3), ("cogging", 2), ("stribeck", 2))
-    found = [Rejected(cause, joint, "") for cause, joint in places]
-    assert [words for _, words in together(found)] == ["Stribeck friction at joints 1, 3 and 2", "payload at the tip",
-                                                       "cogging at joint 2"]
-
-
-def test_a_torque_error_stands_beside_the_noise_floor() -> None:
-    """In N m and in percent of the rated torque; where nothing extends the model, no column of an extended one."""
-    now, then, floor = np.array([0.3, 0.088]), np.array([0.03, 0.08]), np.array([0.03, 0.075])
-    before, after = (ResidualRms(one, one, floor) for one in (now, then))
-    table = torque_errors(before, after, (60.0, math.inf), floor, "left by reference logs", "")
-    assert table.columns == (
-        "joint",
-        "torque error now [N m]",
-        "extended [N m]",
-        "left by reference logs [N m]",
-        "now [% of rated]",
-        "extended [% of rated]",
-    )
-    assert table.rows[0] == (1, 0.3, 0.03, 0.03, 0.5, 0.05)
-    assert table.rows[1][1:4] == (0.088, 0.08, 0.075)
-    same = torque_errors(before, before, (60.0, 60.0), floor, "left by reference logs", "")
-    assert not any("extended" in name for name in same.columns)
+@pytest.mark.parametrize("verdict", ["cause", "no-fault-found", "unknown"])
+def test_the_verdict_says_that_no_log_of_its_own_judged(verdict: str) -> None:
+    there = NOTHING | {"verdict": verdict, "findings": (found("cogging"),) if verdict == "cause" else ()}
+    for held_out in ("logs", "blocks"):
+        page = diagnosis_report(Result(**(there | {"held_out": held_out})))
+        assert ("Judged by blocks held out of the identification logs" in page.verdict) is (held_out != "logs")
+        assert ("none has role validate" in page.verdict) is (held_out == "blocks")

@@ -16,7 +16,6 @@ from pipelines.report.figures import (
     envelope,
     interval_figure,
     joint_signal_figure,
-    timeline_figure,
 )
 from pipelines.report.render import render_report
 from pipelines.report.report import Figure, Report, Section
@@ -57,14 +56,6 @@ def test_an_envelope_draws_no_line_across_a_gap(x: np.ndarray, points: int) -> N
             assert np.isfinite(x[int(t0):int(t1) + 1]).all()
 
 
-def test_three_million_samples_become_a_few_points() -> None:
-    x = np.zeros(3_000_000)
-    x[1_234_567] = 7.0
-    t, small = envelope(np.arange(x.size) / 5000.0, x)
-    assert small.size <= 1300
-    assert t[small == 7.0] == pytest.approx([1_234_567 / 5000.0])
-
-
 TIMES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "even": lambda t: t, "backwards": lambda t: t[::-1], "constant": lambda t: t * 0.0, "missing": lambda t: t * np.nan,
     "one missing": lambda t: np.where(t == t[3], np.nan, t), "huge": lambda t: t * 1e300, "jumps": lambda t: t % 0.1}
@@ -85,15 +76,6 @@ def test_a_damaged_log_can_be_drawn(times: str, values: str) -> None:
     t, x = TIMES[times](base), VALUES[values](base)[:, None]
     assert "<path" in drawn(joint_signal_figure("a", "", t, x, "rad", flagged=~np.isfinite(x)))
     assert "<path" in drawn(interval_figure("b", "", t, 1e-3))
-
-
-@pytest.mark.parametrize("samples", [0, pytest.param(1, marks=pytest.mark.slow), 2])
-def test_a_log_of_hardly_a_sample_can_be_drawn(samples: int) -> None:
-    t = np.arange(samples) / 1000.0
-    assert "<path" in drawn(joint_signal_figure("a", "", t, np.zeros((samples, 2)), "rad"))
-    assert "<path" in drawn(interval_figure("b", "", t, 1e-3))
-    assert "<path" in drawn(timeline_figure("c", "", (0.0, 0.0), []))
-    assert "<path" in drawn(timeline_figure("d", "", (0.0, 0.0), [("gap", [(0.0, 0.0)])]))
 
 
 def test_the_worst_check_comes_first_and_sets_the_tone() -> None:

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.report.figures import interval_figure, joint_signal_figure, timeline_figure
-from pipelines.report.render import render_report, write_report
+from pipelines.report.figures import joint_signal_figure, timeline_figure
+from pipelines.report.render import render_report
 from pipelines.report.report import Figure, Report, Section, Table
 from tests.report.demo import FOOTER, demo_report
 
@@ -155,15 +155,6 @@ def test_a_dollar_is_a_letter_and_not_a_formula() -> None:
     assert (letters("$x$"), letters("x")) == (3, 1)
 
 
-def test_write_report_writes_exactly_what_was_rendered(tmp_path: Path) -> None:
-    report = Report("Title", "Fine.", "good", sections=(Section("Sampling", figures=(
-        interval_figure("intervals", "Even.", np.arange(100) / 1000.0, 1e-3),)),))
-    written = write_report(report, tmp_path / "new", {"made by": "rrrid"})
-    assert [str(path.relative_to(tmp_path / "new")) for path in written] == [
-        "report.html", "figures/intervals.png", "figures/intervals.svg"]
-    assert {path for path in (tmp_path / "new").rglob("*") if path.is_file()} == set(written)
-
-
 def test_tables_align_numbers_and_show_what_is_missing() -> None:
     table = Table(("joint", "range [rad]", "count", "note"),
                   (("1", 3.0, 12000, "a"), ("2", 2.61, None, "b"), ("3", None, 7, "c")))
@@ -171,11 +162,3 @@ def test_tables_align_numbers_and_show_what_is_missing() -> None:
     assert '<td class="number">3.00</td><td class="number">12\u202f000</td><td class="short">a</td>' in page
     assert '<td class="number">2.61</td><td class="number">–</td>' in page
     assert 'range <span class="unit">[rad]</span>' in page
-
-
-@pytest.mark.parametrize("module", ["report", "render", "sections", "figures", "style"])
-def test_importing_a_report_module_imports_neither_matplotlib_nor_jinja2(module: str) -> None:
-    code = (f"import sys, pipelines.report.{module}\n"
-            "print([name for name in ('matplotlib', 'jinja2', 'scipy') if name in sys.modules])")
-    done = subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[2], capture_output=True, text=True)
-    assert done.stdout.strip() == "[]", done.stderr

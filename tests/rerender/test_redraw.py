@@ -15,6 +15,7 @@ from pipelines.rerender import rerender
 from pipelines.stage import Request, run_stage
 from tests.cli.commands import rrrid
 from tests.controlled import controlled_log
+from tests.folders import contents
 from tests.seeds import rarely
 
 
@@ -27,10 +28,6 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for stage, settings in ((inspect.STAGE, inspect.Settings()), (run.STAGE, run.Settings(skip=skipped))):
         run_stage(stage, Request((folder / "logs",), out=folder / stage.name), settings)  # type: ignore[arg-type, type-var]
     return folder
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
 @pytest.mark.parametrize("command", ["inspect", *rarely("run")])

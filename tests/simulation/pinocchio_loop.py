@@ -55,6 +55,19 @@ class Loop:
         return tuple(np.array(column) for column in zip(*rows, strict=True))  # type: ignore[return-value]
 
 
+def backward_pd(q_ref: Vector, kp: Vector, kd: Vector, sample_time: float = 1e-3) -> Law:
+    """τ = -Kp e - Kd (e_k - e_{k-1})/T."""
+    last: list[Vector] = []
+
+    def law(k: int, q: Vector) -> Vector:
+        e = q - q_ref[k]
+        de = (e - last[-1]) / sample_time if last else 0 * e
+        last.append(e)
+        return -kp * e - kd * de
+
+    return law
+
+
 def three_sigmoids(heights: Vector, sharpnesses: Vector, viscous: Vector) -> Friction:
     """Eq. (10) in its printed form, Σ f (1 - 2/(exp(2 w v) + 1)) + b v; heights and sharpnesses (joints, 3)."""
     return lambda v: (heights * (1 - 2 / (np.exp(np.minimum(2 * sharpnesses * v[:, None], 700.0)) + 1))).sum(axis=1) + viscous * v

@@ -14,7 +14,7 @@ from pipelines.io.log import Array, Controller
 from pipelines.simulation import Noise, Plant, run
 from pipelines.simulation.closed_loop import run_together
 from tests.simulation.arms import GAIN, KD, KP, TS, experiment, rrr, rrr_friction, waving
-from tests.simulation.pinocchio_loop import Loop, TransferObserver
+from tests.simulation.pinocchio_loop import Loop, TransferObserver, backward_pd
 
 SAMPLES = 200
 MANY = 9  # robots that are simulated side by side, in arrays
@@ -27,18 +27,11 @@ def pinocchio_run(law: Law, samples: int = SAMPLES, steps: int = 8) -> tuple[Arr
     return Loop(rrr().model, rrr_friction(), TS, steps).run(q[0], dq[0], law, samples)
 
 
-def backward_pd(change: Callable[[int, Array, Array], Array] = lambda k, tau, e: tau) -> Law:
-    """τ = -Kp e - Kd (e_k - e_{k-1})/T, changed by `change`."""
+def changed_pd(change: Callable[[int, Array, Array], Array] = lambda k, tau, e: tau) -> Law:
+    """PD by the backward difference, changed by `change` of sample, torque and error."""
     q_ref = waving(SAMPLES)[0]
-    last: list[Array] = []
-
-    def law(k: int, q: Array) -> Array:
-        e = q - q_ref[k]
-        de = (e - last[-1]) / TS if last else 0 * e
-        last.append(e)
-        return change(k, -KP * e - KD * de, e)
-
-    return law
+    law = backward_pd(q_ref, KP, KD)
+    return lambda k, q: change(k, law(k, q), q - q_ref[k])
 
 
 def plain(**changes: object) -> Controller:
@@ -59,7 +52,7 @@ def agree(controller: Controller, law: Law, atol: float = 1e-8, **changes: Array
 
 def test_decentralised_pd() -> None:
     """Eq. (23) with the backward difference."""
-    agree(plain(), backward_pd())
+    agree(plain(), changed_pd())
 
 
 def test_pd_on_the_observer() -> None:
@@ -83,7 +76,7 @@ def test_integral_action_and_excitation() -> None:
         total[:] = total + TS * e
         return tau - ki * total + v[k]
 
-    agree(plain(ki=ki), backward_pd(change), v=v)
+    agree(plain(ki=ki), changed_pd(change), v=v)
 
 
 def test_one_sample_late() -> None:
@@ -94,13 +87,13 @@ def test_one_sample_late() -> None:
         waiting.append(tau)
         return waiting[-2]
 
-    agree(plain(delay=1), backward_pd(change), tau0=waiting[0])
+    agree(plain(delay=1), changed_pd(change), tau0=waiting[0])
 
 
 def test_limited_output() -> None:
     """The controller's own limit is in the loop and in the log."""
     limit = np.array([12.0, 9.0, 2.0])
-    tau = agree(plain(output_limit=limit), backward_pd(lambda k, tau, e: np.clip(tau, -limit, limit)), atol=1e-7)
+    tau = agree(plain(output_limit=limit), changed_pd(lambda k, tau, e: np.clip(tau, -limit, limit)), atol=1e-7)
     assert (np.abs(tau).max(axis=0) == limit).all()
 
 
@@ -114,7 +107,7 @@ def test_feedforward(parts: tuple[str, ...]) -> None:
     torque = model.torque_parts(Motion(TS * np.arange(SAMPLES), q, dq, ddq))
     ahead = sum(getattr(torque, part) for part in parts)
     agree(Controller("pd+feedforward", KP, KD, velocity="backward-difference", feedforward=parts),
-          backward_pd(lambda k, tau, e: tau + ahead[k]), feedforward_arm=model)
+          changed_pd(lambda k, tau, e: tau + ahead[k]), feedforward_arm=model)
 
 
 def _wrong() -> Arm:
@@ -140,6 +133,18 @@ def test_computed_torque() -> None:
 
     agree(Controller("computed-torque", np.full(3, 400.0), np.full(3, 28.0), velocity="backward-difference", observer_gain=GAIN),
           law, v=v, feedforward_arm=model)
+
+
+def test_open_loop_moves_one_joint_and_holds_the_others() -> None:
+    """The logged torque on joint 3; PD, with the log's gains, on the rest."""
+    torque = np.zeros((SAMPLES, 3))
+    torque[:, 2] = 1.5 * np.sin(0.01 * np.arange(SAMPLES))
+    driven = np.array([False, False, True])
+
+    def change(k: int, tau: Array, e: Array) -> Array:
+        return np.where(driven, torque[k], tau)
+
+    agree(Controller("open-loop", KP, KD, velocity="backward-difference"), changed_pd(change), tau=torque, driven=driven)
 
 
 def test_noise_is_each_replicas_own() -> None:

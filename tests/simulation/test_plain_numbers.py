@@ -12,8 +12,8 @@ from pipelines.effects.drives import LoadFriction, TorqueCrosstalk, TorqueGain, 
 from pipelines.effects.presliding import Presliding
 from pipelines.io.log import Controller
 from pipelines.simulation import Noise, Plant, run
-from pipelines.simulation.integrate import OneArm, RungeKutta
-from tests.simulation.arms import KD, KP, TS, experiment, rrr
+from pipelines.simulation.integrate import OneArm
+from tests.simulation.arms import KD, KP, experiment, rrr
 
 SAMPLES, MANY = 100, 9  # more replicas than are run one after the other
 LAWS = {
@@ -55,23 +55,6 @@ def test_alone_and_among_many(name: str) -> None:
     alone, among = both(arm)
     np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
     assert np.abs(alone - by_itself(plant())).max() > 1e-4
-
-
-def test_the_integrator_moves_memories_as_runge_kutta_does() -> None:
-    """One sample after the other, outside a loop: angles, speeds and memories."""
-    arm = plant(acting(LAWS["LuGre"]), acting(LAWS["breakaway"]))
-    ours, theirs = OneArm(arm, TS, 3), RungeKutta(arm.prepared(2), TS, 3)
-    state, states = np.array([[0.1], [-1.0], [0.4], [0.0], [0.2], [-0.1]]), np.zeros((1, 2))
-    other, others, seen = np.repeat(state, 2, axis=1), np.zeros((2, 2)), []
-    for k in range(300):
-        torque = np.array([[3.0], [8.0], [2.0]]) * np.sin(0.03 * k + np.arange(3.0)[:, None])
-        now = ours.moved([*state[:, 0].tolist(), *states[0].tolist()], torque[:, 0].tolist())
-        state[:, 0], states[0] = now[:6], now[6:]
-        others = theirs.advance(np.full(2, TS * k), other, others, np.repeat(torque, 2, axis=1))
-        seen.append(states[0].copy())
-    np.testing.assert_allclose(state[:, 0], other[:, 1], rtol=0.0, atol=1e-10)
-    np.testing.assert_allclose(states[0], others[1], rtol=0.0, atol=1e-10)
-    assert np.ptp(seen, axis=0).min() > 1.0  # they bent to one side, and to the other
 
 
 DRIVES = {

@@ -14,7 +14,7 @@ from pipelines.io.log import Array, Controller
 from pipelines.simulation import Noise, Plant, choose_step, run
 from tests.seeds import rarely
 from tests.simulation.arms import KD, KP, TS, experiment, rrr, rrr_friction, waving
-from tests.simulation.pinocchio_loop import Friction, Loop
+from tests.simulation.pinocchio_loop import Friction, Loop, backward_pd
 
 NOISE = Noise(np.array([0.020, 0.010, 0.005]), np.zeros(3))
 PD = Controller("pd", KP, KD, velocity="backward-difference")
@@ -30,15 +30,7 @@ def dry(sharpness: float) -> tuple[Arm, Friction]:
 def judged(friction: Friction, samples: int, steps: int) -> Array:
     """Pinocchio's positions under the same PD."""
     q_ref, dq_ref, _ = waving(samples)
-    last: list[Array] = []
-
-    def law(k: int, q: Array) -> Array:
-        e = q - q_ref[k]
-        de = (e - last[-1]) / TS if last else 0 * e
-        last.append(e)
-        return -KP * e - KD * de
-
-    return Loop(rrr().model, friction, TS, steps).run(q_ref[0], dq_ref[0], law, samples)[0]
+    return Loop(rrr().model, friction, TS, steps).run(q_ref[0], dq_ref[0], backward_pd(q_ref, KP, KD), samples)[0]
 
 
 @pytest.mark.parametrize("sharpness", [None, 100.0, *rarely(2000.0)])

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.body import Motion
-from pipelines.errors import InputRejected
 from pipelines.io.log import Array
 from pipelines.simulation import Plant, Windows, simulate_windows
 from tests.simulation.arms import KD, KP, TS, rrr, rrr_friction, waving
-from tests.simulation.pinocchio_loop import Loop
+from tests.simulation.pinocchio_loop import Loop, backward_pd
 
 SAMPLES = 1000
 
@@ -21,15 +20,7 @@ SAMPLES = 1000
 def recorded() -> tuple[Motion, Array]:
     """Motion and held torque of the RRR arm under PD, by Pinocchio."""
     q_ref, dq_ref, _ = waving(SAMPLES)
-    last: list[Array] = []
-
-    def law(k: int, q: Array) -> Array:
-        e = q - q_ref[k]
-        de = (e - last[-1]) / TS if last else 0 * e
-        last.append(e)
-        return -KP * e - KD * de
-
-    q, dq, tau = Loop(rrr().model, rrr_friction(), TS, 8).run(q_ref[0], dq_ref[0], law, SAMPLES)
+    q, dq, tau = Loop(rrr().model, rrr_friction(), TS, 8).run(q_ref[0], dq_ref[0], backward_pd(q_ref, KP, KD), SAMPLES)
     return Motion(TS * np.arange(SAMPLES), q, dq, 0 * q), tau
 
 
@@ -71,11 +62,3 @@ def test_no_window_spans_a_gap(recorded: tuple[Motion, Array]) -> None:
     assert np.isnan(found.q[[250, 530]]).all()
     inside = (found.first[:, None] + np.arange(100)).ravel()
     assert np.abs((found.q - motion.q)[inside]).max() < 1e-6
-
-
-def test_too_long_a_window_is_refused(recorded: tuple[Motion, Array]) -> None:
-    """T08 where no stretch holds one."""
-    motion, tau = recorded
-    with pytest.raises(InputRejected, match="1001 samples") as refused:
-        simulated(motion, tau, length=1001)
-    assert refused.value.code == "RRID-T08"

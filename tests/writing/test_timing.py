@@ -28,17 +28,6 @@ def sampled(law: TimeLaw) -> np.ndarray:
     return np.unique(np.concatenate([np.linspace(-0.1, law.duration + 0.1, 20_001), law.start]))
 
 
-def test_the_whole_path_is_gone_once(path: TipPath, pace: Pace) -> None:
-    """From the beginning to the end, never backwards, every phase starting where the one before it ended."""
-    law = time_law(path, pace)
-    s = law.at(sampled(law))[0]
-    assert s[0] == 0.0
-    assert s[-1] == pytest.approx(path.length, abs=1e-12)
-    assert np.diff(s).min() >= -1e-12
-    ends = law.at(np.nextafter(law.start[1:-1], 0.0))[0]
-    assert np.abs(ends - law.s[1:]).max() <= 1e-12
-
-
 def test_speed_and_acceleration_are_derivatives(path: TipPath, pace: Pace) -> None:
     """ds/dt and dv/dt by eighth-order differences, away from where a phase ends."""
     law, h = time_law(path, pace), 2e-6
@@ -63,12 +52,3 @@ def test_nothing_beyond_the_pace(path: TipPath, pace: Pace) -> None:
     assert np.abs(np.diff(a) / np.diff(t))[np.diff(t) > 1e-6].max() <= pace.jerk * (1 + 1e-6)
     before, after = law.at(law.start - 1e-9), law.at(law.start + 1e-9)
     assert max(np.abs(x - y).max() for x, y in zip(before, after, strict=True)) <= 3e-9 * max(pace.jerk, pace.fast)
-
-
-def test_at_rest_in_corners_and_slow_in_bends(path: TipPath, pace: Pace) -> None:
-    law = time_law(path, pace)
-    for k, joint in enumerate(path.joints):
-        last = int(np.flatnonzero(law.piece == k)[-1])
-        assert law.after[last] == (0.0 if joint == "corner" else pytest.approx(law.before[last + 1]))
-        assert law.after[last] <= pace.slow
-    assert law.before[0] == law.after[-1] == 0.0
