@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from bench.draw import machine_of
-from bench.machine import Fault, Floats, Hooks, Machine, Parameters, Run, coulomb_viscous
+from bench.machine import Machine, coulomb_viscous
 from bench.motions import Reference, times
 from pipelines.io.log import Array
 from pipelines.io.robot import Joint, LinkParameters, RobotDescription
@@ -51,28 +51,3 @@ def turntable(inertia: float = 0.8) -> Machine:
     )
     machine = machine_of(robot, nuisances=False)
     return frictionless(replace(machine, robot=robot)).ideal
-
-
-class Spy(Fault):
-    """Does nothing but note the torque at the motors in each inner step."""
-
-    name = "spy"
-
-    def __init__(self) -> None:
-        object.__setattr__(self, "joint", None)
-        object.__setattr__(self, "applied", [])
-
-    applied: list[Floats]
-
-    @classmethod
-    def full(cls, case: object) -> Spy:
-        return cls()
-
-    def scaled(self, factor: float) -> Spy:
-        return self
-
-    def parameters(self) -> Parameters:
-        return {}
-
-    def start(self, run: Run) -> Hooks:
-        return Hooks(step=lambda t, q, v: self.applied.append(list(run.applied)))

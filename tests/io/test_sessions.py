@@ -37,21 +37,6 @@ def test_one_description_is_two_robots_where_they_have_two_names() -> None:
     assert list(together(opened("a", recorded=DAY), opened("b", recorded=DAY, robot_text=other)).values()) == [{"a"}, {"b"}]
 
 
-@pytest.mark.parametrize(("times", "sessions"), [
-    (("2026-03-02T22:30:00Z", "2026-03-02T23:50:00Z", "2026-03-03T00:20:00Z"), 1),  # an afternoon on the west coast
-    (("2026-03-02T22:30:00Z", "2026-03-03T02:00:00Z"), 2),  # a pause of more than three hours
-    (("2026-03-02T10:00:00Z", "2026-03-02T23:50:00Z", "2026-03-03T00:20:00Z"), 2),  # fourteen hours in all
-    (("2026-03-02T23:50:00Z", "2026-03-03"), 2),  # nobody told the hour
-    (("2026-03-02T23:50:00Z", "2026-03-04T00:10:00Z"), 2),
-])
-def test_midnight_alone_ends_no_session(times: tuple[str, ...], sessions: int) -> None:
-    """Days are UTC: a session may begin on one and end on the next. A machine that logs every hour still has its days."""
-    logs = [opened(str(i), recorded=time) for i, time in enumerate(times)]
-    assert len(together(*logs)) == sessions
-    hourly = [opened(str(i), recorded=f"2026-03-{2 + i // 24:02d}T{i % 24:02d}:00:00Z") for i in range(72)]
-    assert len(together(*hourly)) == 3
-
-
 def test_several_robots_are_refused_with_the_names_of_all() -> None:
     """The error says what is whose."""
     a, b = opened("a", robot_name="arm-a"), opened("b", "other", robot_name="arm-b")

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import fields
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +12,6 @@ from pipelines.diagnosis.result import (
     Finding,
     Gain,
     ResidualRms,
-    Result,
     Value,
 )
 from pipelines.effects import effect_names, find_effect
@@ -23,16 +20,9 @@ from pipelines.report.diagnosis_finding import (
     finding_section,
     numbers_section,
 )
-from pipelines.report.diagnosis_report import diagnosis_report
 
 KEY = re.compile(r"[a-z]+_[a-z0-9]+|\b[a-z]+:\d")
 COMMAND = re.compile(r'"rrrid [^"]*"')
-
-NOTHING: Any = {field.name: () for field in fields(Result)} | {
-    "boundary": None,
-    "verdict": "no-fault-found", "question": "what is wrong", "reason": "", "noise_floor_origin": "reference logs",
-    "held_out": "logs", "robot": "", "residual_rms": ResidualRms(*(np.ones(3),) * 3),
-    "after_rms": ResidualRms(*(np.ones(3),) * 3), "rated": (50.0,) * 3}
 
 
 def found(cause: str) -> Finding:
@@ -56,12 +46,3 @@ def test_a_finding_is_told_in_words(cause: str) -> None:
     for name, _, unit, meaning in numbers.rows:
         assert KEY.findall(f"{name} {meaning}") == []
         assert all((unit, meaning))
-
-
-@pytest.mark.parametrize("verdict", ["cause", "no-fault-found", "unknown"])
-def test_the_verdict_says_that_no_log_of_its_own_judged(verdict: str) -> None:
-    there = NOTHING | {"verdict": verdict, "findings": (found("cogging"),) if verdict == "cause" else ()}
-    for held_out in ("logs", "blocks"):
-        page = diagnosis_report(Result(**(there | {"held_out": held_out})))
-        assert ("Judged by blocks held out of the identification logs" in page.verdict) is (held_out != "logs")
-        assert ("none has role validate" in page.verdict) is (held_out == "blocks")

@@ -135,18 +135,6 @@ def test_computed_torque() -> None:
           law, v=v, feedforward_arm=model)
 
 
-def test_open_loop_moves_one_joint_and_holds_the_others() -> None:
-    """The logged torque on joint 3; PD, with the log's gains, on the rest."""
-    torque = np.zeros((SAMPLES, 3))
-    torque[:, 2] = 1.5 * np.sin(0.01 * np.arange(SAMPLES))
-    driven = np.array([False, False, True])
-
-    def change(k: int, tau: Array, e: Array) -> Array:
-        return np.where(driven, torque[k], tau)
-
-    agree(Controller("open-loop", KP, KD, velocity="backward-difference"), changed_pd(change), tau=torque, driven=driven)
-
-
 def test_noise_is_each_replicas_own() -> None:
     """A seed gives the same run alone, among others and without arrays; another seed another one; its size is as asked."""
     plant, asked = Plant.of(rrr().arm), experiment(plain(), 400)

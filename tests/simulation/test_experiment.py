@@ -40,7 +40,7 @@ def replaced(log: ExperimentLog, **values: np.ndarray) -> ExperimentLog:
     (log_of(None), "S22", "does not say how its controller works"),
     (log_of(replace(PD, kd=None)), "S22", "lacks kd"),
     (log_of(replace(PD, law="pd+feedforward")), "S22", "lacks feedforward"),
-    (log_of(Controller("open-loop"), experiment="friction", joint=2), "S22", "how the others are held"),
+    (log_of(Controller("open-loop"), experiment="friction", joint=2), "S22", "open loop"),
     (log_of(without=("q_ref",)), "S22", "q_ref"),
     (replaced(log_of(), q_ref=np.full((SAMPLES, 3), np.nan)), "D02", "q_ref"),
     (replaced(log_of(), t=np.cumsum(np.r_[0.0, np.full(SAMPLES - 1, TS)]) + 0.3 * (np.arange(SAMPLES) > 20)), "T05", "gaps"),

@@ -123,7 +123,7 @@ def test_a_model_is_not_judged_by_what_it_was_fitted_to(writing: ExperimentLog, 
 
 
 @pytest.mark.parametrize(("settings", "code"), [
-    (Settings("rrr", torque_gate=0.0), "C02"), (Settings("nobody"), "C04"), (Settings(text="R", via_points=3), "C02"),
+    (Settings("rrr", torque_gate=0.0), "C02"), (Settings("nobody"), "C04"), (Settings(text="R", size=-1.0), "C02"),
     (Settings(text="#"), "C02"), (Settings(text="R" * 1000), "C02")])
 def test_settings_that_make_no_sense_are_refused(settings: Settings, code: str, writing: ExperimentLog, tmp_path: Path) -> None:
     with pytest.raises(RrridError) as refused:
