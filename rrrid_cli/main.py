@@ -20,6 +20,7 @@ from pipelines.errors import Interrupted, RrridError, UsageError, did_you_mean
 from pipelines.io.output import fault_of, renamed
 from rrrid_cli.app import build
 from rrrid_cli.console import print_error
+from rrrid_cli.options import RENAMED
 
 __all__ = ["call", "entry"]
 
@@ -113,7 +114,9 @@ def _usage_error(problem: typer.TyperException, called: str) -> UsageError:
         known = list(getattr(context.command, "commands", {}))
         if found[1] == "option":
             known = [name for one in context.command.get_params(context) for name in one.opts]
-        text, code = f"no such {found[1]} '{found[2]}'{did_you_mean(found[2], known)}", "C01"
+        now = RENAMED.get(found[2], "")
+        hint = f", it is {now} now" if now in known else did_you_mean(found[2], known)
+        text, code = f"no such {found[1]} '{found[2]}'{hint}", "C01"
     return UsageError(code, f"{text[0].lower()}{text[1:]}", where, f"see '{where} --help'")
 
 

@@ -35,6 +35,21 @@ STAGES = tuple(name for name in COMMANDS if name not in ("batch", "report", "sch
 # What a stage reads by itself. Within `run` it has logs and models from the run, unless the field
 # says `in_run`.
 OWN_INPUTS = ("identify", "validate", "reference", "model", "text", "recipe")
+# What options of earlier versions are called now.
+RENAMED = {
+    "--after": "--prior-logs",
+    "--allow-mismatch": "--skip-sanity-checks",
+    "--allow-same": "--allow-overlap",
+    "--filter": "--cutoff-hz",
+    "--for": "--experiment",
+    "--fresh": "--no-cache",
+    "--keep-out": "--stop-band",
+    "--like": "--replay",
+    "--most": "--max-causes",
+    "--seconds": "--time-limit",
+    "--tell-apart": "--discriminate",
+    "--without": "--exclude",
+}
 KINDS = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
 METAVARS = {int: "NUMBER", float: "NUMBER", str: "TEXT", Path: "PATH"}
 EXAMPLES = {int: ("whole number", "4", "20,20,10"), float: ("number", "0.5", "50,60,70")}

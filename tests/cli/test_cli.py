@@ -85,6 +85,7 @@ def test_every_error_is_one_line_with_code_and_remedy(logs: Path, words: tuple[s
     (("diagnose", "logs", "--exclude", "cogging:2"),
      "RRID-C02 --exclude: 'cogging:2': a cause is left out as a whole, at every joint. Write cogging."),
     (("convert", "logs", "-q", "-v"), "RRID-C02 -q, -v: "),
+    (("diagnose", "logs", "--most", "3"), "RRID-C01 rrrid diagnose: no such option '--most', it is --max-causes now. See "),
 ])
 def test_wrong_usage_is_one_line_and_exit_2(logs: Path, words: tuple[str, ...], said: str) -> None:
     """A misspelt command or option, a missing argument or a wrong value is said as every other error is."""
