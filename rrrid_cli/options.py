@@ -1,13 +1,12 @@
 """Options of the command line, made of dataclasses: names, help, defaults and kinds of values.
 
 A field declared by `pipelines.io.option.option` is an option of its stage's command; any other is
-set by --set or --config alone. typer gets every value as text, and `read_values` reads it as the
-field's kind.
+set by --set or --config alone. typer gets every value as text, and `converted` makes it what the
+field holds.
 """
 
 from __future__ import annotations
 
-import sys
 import types
 import typing
 from collections.abc import Iterable, Mapping
@@ -50,9 +49,14 @@ RENAMED = {
     "--tell-apart": "--discriminate",
     "--without": "--exclude",
 }
-KINDS = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
-METAVARS = {int: "NUMBER", float: "NUMBER", str: "TEXT", Path: "PATH"}
-EXAMPLES = {int: ("whole number", "4", "20,20,10"), float: ("number", "0.5", "50,60,70")}
+# kind -> its name on the command line, in words, an example
+KINDS: dict[Any, tuple[str, str, str]] = {
+    int: ("NUMBER", "whole number", "4"),
+    float: ("NUMBER", "number", "0.5"),
+    bool: ("", "truth value", "true"),
+    str: ("TEXT", "text", '"a"'),
+    Path: ("PATH", "path", '"a/b"'),
+}
 
 
 @dataclass(frozen=True)
@@ -109,28 +113,32 @@ def parameters(
         texts: field -> other help.
     """
     found, hints = [], typing.get_type_hints(kind)
-    for field in fields(kind):
-        if "help" not in field.metadata or (only is not None and field.name not in only):
+    for field in _options(kind):
+        if only is not None and field.name not in only:
             continue
         value, many = _kind(hints[field.name])
         taken: Any = bool if value is bool else list[str] if many else str
-        metavar = None if value is bool else METAVARS[value]
+        metavar = KINDS[value][0] or None
         if field.metadata.get("pair"):
             taken, metavar = tuple[str, str], f"{metavar} {metavar}"
-        flag = _flags(field)[0]
+        flags = _flags(field)
         text = texts.get(field.name, field.metadata["help"])
         default: Any = field.default
         if default not in (None, False, True, (), "", Path()) and not text.endswith("]"):
             text += f" [{','.join(map(str, default)) if many else default}]"
-        about: Any = typer.Argument(help=text, metavar=flag, show_default=False)
-        if flag.startswith("-"):
-            about = typer.Option(*_flags(field), help=text, metavar=metavar)
+        about: Any = typer.Argument(help=text, metavar=flags[0], show_default=False)
+        if flags[0].startswith("-"):
+            about = typer.Option(*flags, help=text, metavar=metavar)
         must = field.name in required
         shape: Any = taken if must else taken | None
-        name, start = _key(kind, field), Parameter.empty if must else None
-        noted = Annotated[shape, about]
+        start, noted = Parameter.empty if must else None, Annotated[shape, about]
+        name = _key(kind, field)
         found.append(Parameter(name, Parameter.KEYWORD_ONLY, default=start, annotation=noted))
     return found
+
+
+def _options(kind: type[Any]) -> list[Field[Any]]:
+    return [field for field in fields(kind) if "help" in field.metadata]
 
 
 def _flags(field: Field[Any]) -> tuple[str, ...]:
@@ -161,37 +169,54 @@ def read_values(kind: type[Any], given: Mapping[str, Any]) -> dict[str, Any]:
         UsageError: C02, no number where the option takes one.
     """
     hints, found = typing.get_type_hints(kind), dict[str, Any]()
-    for field in fields(kind):
-        value = given.get(_key(kind, field))
-        if "help" not in field.metadata or value is None:
+    for field in _options(kind):
+        value, flag = given.get(_key(kind, field)), _flags(field)[0]
+        if value is None:
             continue
-        wanted, many = _kind(hints[field.name])
-        flag = _flags(field)[0]
-        if wanted is bool:
-            found[field.name] = value if "/" in flag else not field.default
-        elif wanted in EXAMPLES and many:
-            found[field.name] = _numbers(wanted, ",".join(value), flag, many)
-        elif wanted in EXAMPLES:
-            found[field.name] = _numbers(wanted, value, flag, many)[0]
-        else:
-            found[field.name] = tuple(map(wanted, value)) if many else wanted(value)
+        if isinstance(value, bool) and "/" not in flag:
+            value = not field.default
+        found[field.name] = _converted(hints[field.name], value, flag)
     return found
 
 
-def _numbers(kind: type[Any], text: str, flag: str, many: bool) -> tuple[Any, ...]:
-    """Return the numbers of an option: one, or several with commas between them."""
+def _converted(hint: Any, value: Any, where: str) -> Any:
+    """Return a text of the command line, or a value of TOML, as a field of that type holds it.
+
+    A text is a list of one; of numbers, "1,3" is a list of two.
+
+    Raises:
+        UsageError: C02, it is of another kind.
+    """
+    kind, many = _kind(hint)
+    items = list(value) if isinstance(value, list | tuple) else [value]
+    if many and kind in (int, float):
+        texts = (item.split(",") if isinstance(item, str) else [item] for item in items)
+        items = [item for parts in texts for item in parts]
     try:
-        values = tuple(map(kind, text.split(",") if many else [text]))
-        if kind is float or all(abs(value) < 1 << 63 for value in values):
-            return values
-    except ValueError:
-        pass
-    name, one, several = EXAMPLES[kind]
-    message, remedy = f"'{clean(text, 60)}' is no {name}", f"give a {name}, such as {one}"
-    if many:
-        message = f"'{clean(text, 60)}' is no list of {name}s"
-        remedy = f"write for example {several}"
-    raise UsageError("C02", message, flag, remedy)
+        found = tuple(_one(kind, item) for item in items)
+    except (ValueError, OverflowError):
+        found = ()
+    if len(found) != len(items) or (not many and (len(found) != 1 or isinstance(value, list))):
+        _, words, example = KINDS[kind]
+        words = f"list of {words}s" if many else words
+        shown = f"'{value}'" if isinstance(value, str) else repr(value)
+        message, remedy = f"{clean(shown, 60)} is no {words}", f"give a {words}, such as {example}"
+        raise UsageError("C02", message, where, remedy)
+    return found if many else found[0]
+
+
+def _one(kind: Any, item: Any) -> Any:
+    """Return one value as `kind`; ValueError, OverflowError where it is none."""
+    if isinstance(item, bool) or kind is bool:
+        if kind is bool and isinstance(item, bool):
+            return item
+    elif isinstance(item, str) or (kind is float and isinstance(item, int | float)):
+        value = kind(item)
+        if kind is not int or abs(value) < 1 << 63:
+            return value
+    elif kind is int and isinstance(item, int) and abs(item) < 1 << 63:
+        return item
+    raise ValueError
 
 
 def settable(command: str) -> dict[str, list[str]]:
@@ -243,13 +268,17 @@ def make_settings(
             message = f"'{name}' is a stage, not an option"
             raise UsageError("C01", message, where, f"write a table [{name}]")
         owner = stage_of(name).settings
+        hints, known = typing.get_type_hints(owner), _names(owner)
         for key, value in options.items():
+            place = f"{where}, {name}.{key}"
             if stage == "run" and name in _run_stages() and _is_own(owner, key):
                 message = f"{name}.{key} has no place in a run, whose stages share logs and models"
                 remedy = f"give it to rrrid {name}; run takes --identify, --validate, --reference"
                 raise UsageError("C02", message, where, remedy)
-            value = _value(owner, key, value, f"{where}, {name}.{key}")
-            chosen.setdefault(name, {})[key] = value
+            if key not in known:
+                message = f"no such option{did_you_mean(key, known)}"
+                raise UsageError("C01", message, place, f"there are: {', '.join(known) or 'none'}")
+            chosen.setdefault(name, {})[key] = _converted(hints[key], value, place)
     own = chosen.pop(stage) | dict(given)
     if stage == "run":
         own["stages"] = {name: stage_of(name).settings(**values) for name, values in chosen.items()}
@@ -280,31 +309,3 @@ def _from_set(text: str) -> tuple[str, str, Any]:
     except TomlError:
         parsed = value.strip()  # a bare word is a text
     return "--set", stage, {key: parsed}
-
-
-def _value(kind: type[Any], name: str, value: Any, where: str) -> Any:
-    """Return a value of TOML as the field `name` takes it."""
-    known = _names(kind)
-    if name not in known:
-        message = f"no such option{did_you_mean(name, known)}"
-        there = ", ".join(known) or "none"
-        raise UsageError("C01", message, where, f"there are: {there}")
-    wanted, many = _kind(typing.get_type_hints(kind)[name])
-    values = value if many and isinstance(value, list) else [value]
-    listed = not many or isinstance(value, list | str)  # a text: a list of one
-    if listed and all(_fits(wanted, item) for item in values):
-        return tuple(map(wanted, values)) if many else wanted(value)
-    what = "a list" if many else KINDS.get(wanted, f"a {wanted.__name__}")
-    message = f"{clean(repr(value), 60)} is not {what}"
-    raise UsageError("C02", message, where, "correct the value")
-
-
-def _fits(kind: type[Any], value: Any) -> bool:
-    """Say whether a value of TOML is of a kind; its whole numbers have no bound."""
-    if isinstance(value, bool):
-        return kind is bool
-    if kind is float:
-        return isinstance(value, int | float) and abs(value) <= sys.float_info.max
-    if kind is int:
-        return isinstance(value, int) and abs(value) < 1 << 63
-    return kind in (str, Path) and isinstance(value, str)
