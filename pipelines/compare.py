@@ -34,8 +34,6 @@ from pipelines.report.report import Report
 from pipelines.report.result_figures import fitted, numbers_of, residuals, robot_of
 from pipelines.stage import Inputs, Request, Stage
 
-__all__ = ["STAGE", "Comparison", "Settings", "compute", "read", "report"]
-
 _Figures = Mapping[str, tuple[float, float, str]]  # name -> value, std, unit
 _Place = tuple[str, int | None]  # cause, joint
 

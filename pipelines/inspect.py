@@ -40,8 +40,6 @@ from pipelines.report.report import Report, Section, Table
 from pipelines.report.sections import boundary_card, checks_table, level_tone
 from pipelines.stage import Inputs, Request, Stage, Uses, read_logs
 
-__all__ = ["STAGE", "Result", "Settings", "compute", "report"]
-
 _TRUST = "--trust-units"
 
 

@@ -43,8 +43,6 @@ from pipelines.report.render import write_report
 from pipelines.report.report import Report
 from pipelines.stage import Stage, footer_of, result_type
 
-__all__ = ["rerender"]
-
 _AGAIN = "run the command again"
 
 

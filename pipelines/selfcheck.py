@@ -27,7 +27,6 @@ from pipelines.io.sessions import Inputs
 if TYPE_CHECKING:
     from pipelines.io.log import ExperimentLog
 
-__all__ = ["Finding", "examine", "self_test"]
 
 Level = Literal["ok", "warn", "bad"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from collections.abc import Callable, Mapping
@@ -32,7 +33,6 @@ from rrrid_cli.options import (
 if TYPE_CHECKING:
     from pipelines.stage import Outcome
 
-__all__ = ["STAGES", "build", "schema_of"]
 
 # Fields of `Inputs` that a command takes beside its settings; any other has those of a command that
 # reads logs by their roles.
@@ -292,7 +292,6 @@ def _batch(name: str, given: Mapping[str, Any]) -> int:
     from pipelines.batch import module_of, run_batch
     from pipelines.executor import Plan
     from pipelines.io.output import slug
-    from pipelines.io.processors import processors
     from pipelines.stage import Request
 
     module, values = module_of(own.stage), vars(common) | vars(own)
@@ -300,7 +299,7 @@ def _batch(name: str, given: Mapping[str, Any]) -> int:
     request = Request((), **_fields_of(Request, values | {"out": None}))
     values |= {
         "out": common.out or Path("runs/several") / slug(own.root.resolve().name) / "batch",
-        "jobs": own.jobs or processors(),
+        "jobs": own.jobs or len(os.sched_getaffinity(0)),
         "memory": _bytes(own.memory),
         "shard": read_shard(own.shard),
     }

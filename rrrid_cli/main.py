@@ -22,8 +22,6 @@ from rrrid_cli.app import build
 from rrrid_cli.console import print_error
 from rrrid_cli.options import RENAMED
 
-__all__ = ["call", "entry"]
-
 _SIGNALS = (signal.SIGTERM, signal.SIGINT)
 
 

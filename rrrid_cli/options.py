@@ -23,8 +23,6 @@ from pipelines.errors import UsageError, clean, did_you_mean
 from pipelines.io.option import option
 from pipelines.io.sandbox import TomlError, parse_toml, read_small_text
 
-__all__ = ["Common", "make_settings", "parameters", "read", "read_values", "settable", "stage_of"]
-
 S = TypeVar("S")
 # In the order in which they are needed.
 COMMANDS = ["run", "batch", "demo", "inspect", "import", "convert", "design-excitation"]

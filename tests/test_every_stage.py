@@ -26,7 +26,7 @@ from pipelines.report import render
 from pipelines.report.report import Figure
 from pipelines.report.style import figure_style
 from pipelines.stage import Outcome, Request, Stage, run_stage
-from rrrid_cli.app import STAGES
+from rrrid_cli.options import STAGES
 from tests.controlled import controlled_log
 from tests.diagnose.sessions import but, session, written
 from tests.healthy import begun

@@ -6,7 +6,6 @@ import contextlib
 import math
 import re
 from collections.abc import Collection, Iterator, Mapping
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -138,11 +137,9 @@ def read_parts(path: Path, only: Collection[str] | None = None) -> Answer:
     """
     where = str(path)
     with _opened(path) as file:
-        # First what could lead elsewhere, then what the file says it is, then its names.
-        _refuse_links(file, where)
         head = {n: _attribute(file.attrs, n, where) for n in _HEAD if n in file.attrs}
         refuse_version(head, "HDF5", where)
-        _refuse_unknown(file, ("robot", "signals", *_GROUPS), where)
+        _check_members(file, ("robot", "signals", *_GROUPS), where)
         attributes = _attributes(file, where)
         digest = attributes.pop("digest", None)
         groups: dict[str, Any] = {
@@ -150,10 +147,10 @@ def read_parts(path: Path, only: Collection[str] | None = None) -> Answer:
         }
         for name in _GROUPS:
             if name in file:
-                groups[name] = _attributes(_group(file, name, (), where), f"{where}, /{name}")
+                groups[name] = _attributes(_group(file, name, ()), f"{where}, /{name}")
         if "robot" in file:
             groups["robot"] = _robot_text(file["robot"], where)
-        signals = _group(file, "signals", file.get("signals", ()), where)
+        signals = _group(file, "signals", file.get("signals", ()))
         for name in signals:
             _refuse_bad_dataset(signals[name], f"{where}, /signals/{name}")
         declared = sum(8 * math.prod(one.shape) for one in signals.values())
@@ -183,45 +180,39 @@ def refuse_version(attributes: dict[str, Any], container: str, where: str) -> No
         raise InputRejected("F11", words, where, "update rrrid, or write the log in that version")
 
 
-def _refuse_links(group: Any, where: str) -> None:
-    """Refuse all but hard links before one is followed (X01, X04)."""
-    import h5py
+def _check_members(group: Any, known: Collection[str], where: str) -> None:
+    """Refuse links before one is followed (X01, X04), and what the format does not name (S19).
 
-    for name in islice(group, LIMITS.members + 1):
-        link = group.get(name, getlink=True)
-        if isinstance(link, h5py.ExternalLink):
-            words = f"external link '{name}' -> '{link.filename}' refused"
-            raise InputRejected("X01", words, where, "store the data in the log itself")
-        if isinstance(link, h5py.SoftLink):
-            words, remedy = f"soft link '{name}' refused", "store the data in the log itself"
-            raise InputRejected("X04", words, where, remedy)
-
-
-def _refuse_unknown(group: Any, known: Collection[str], where: str) -> None:
-    """Refuse what the format does not name (S19); a group, however deep, unseen (X04)."""
+    A group that it does not name is not looked into, however deep it is (X04).
+    """
     import h5py
 
     if max(len(group), len(group.attrs)) > LIMITS.members:
         words = f"more than {LIMITS.members} members or attributes"
         raise InputRejected("X04", words, where, "a log holds robot, controller and signals")
+    store = "store the data in the log itself"
     for name in group:
+        link = group.get(name, getlink=True)
+        if isinstance(link, h5py.ExternalLink):
+            words = f"external link '{name}' -> '{link.filename}' refused"
+            raise InputRejected("X01", words, where, store)
+        if isinstance(link, h5py.SoftLink):
+            raise InputRejected("X04", f"soft link '{name}' refused", where, store)
         if name not in known:
+            is_group = group.get(name, getclass=True) is h5py.Group
             words = f"'{name}' is not in format version {FORMAT_VERSION}"
-            if group.get(name, getclass=True) is h5py.Group:
-                words = f"group {words}, and not looked into"
-                raise InputRejected("X04", words, where, "remove it")
-            raise InputRejected("S19", words, where, "remove it")
+            words = f"group {words}, and not looked into" if is_group else words
+            raise InputRejected("X04" if is_group else "S19", words, where, "remove it")
 
 
-def _group(file: Any, name: str, known: Collection[str], where: str) -> Any:
+def _group(file: Any, name: str, known: Collection[str]) -> Any:
     """Return a group that holds nothing but `known`, and no links."""
     import h5py
 
     if file.get(name, getclass=True) is not h5py.Group:
         remedy = "a log has /robot and /signals"
-        raise InputRejected("S01", f"group /{name} is missing", where, remedy)
-    _refuse_links(file[name], f"{where}, /{name}")
-    _refuse_unknown(file[name], known, f"{where}, /{name}")
+        raise InputRejected("S01", f"group /{name} is missing", file.filename, remedy)
+    _check_members(file[name], known, f"{file.filename}, /{name}")
     return file[name]
 
 

@@ -11,8 +11,6 @@ from pipelines.quality.config import CONFIG
 from pipelines.quality.segments import long_blocks
 from pipelines.quality.subject import Subject, many
 
-__all__ = ["CLOCK_CHECKS", "ORDER_CHECKS", "length"]
-
 
 def length(s: Subject) -> list[Check]:
     """T08, T07: there are samples, and a periodic log holds a whole period."""

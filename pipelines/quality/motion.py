@@ -13,8 +13,6 @@ from pipelines.quality.config import CONFIG
 from pipelines.quality.segments import lagged_speed
 from pipelines.quality.subject import NotTested, Subject, spread
 
-__all__ = ["MOTION_CHECKS", "both_ways", "limits", "peak_speed"]
-
 
 def peak_speed(s: Subject) -> Array:
     """Return the largest speed (joints,) [rad/s] over ±10 ms in the usable stretches, or NaN."""

@@ -24,9 +24,6 @@ from pipelines.io.limits import ABSURD, GAP_LIMIT, GAP_TICKS, SHORTEST, sentinel
 from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.quality.config import CONFIG
 
-__all__ = ["SHORTEST", "Mask", "TimeBase", "Usable", "lagged_speed", "long_blocks", "quantum"]
-__all__ += ["spikes", "time_base", "torque_limit", "usable"]
-
 Mask = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.intp]
 

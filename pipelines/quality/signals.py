@@ -14,8 +14,6 @@ from pipelines.quality.config import CONFIG
 from pipelines.quality.segments import long_blocks, torque_limit
 from pipelines.quality.subject import NotTested, Place, Subject, flagged, many, spread
 
-__all__ = ["SIGNAL_CHECKS"]
-
 _REPAIR = "look at this channel's cable and its place in the recorder, and record again"
 
 

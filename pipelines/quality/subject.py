@@ -15,8 +15,6 @@ from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.schema import joint_unit
 from pipelines.quality.segments import Indices, Mask, Usable, usable
 
-__all__ = ["NotTested", "Place", "Subject", "flagged", "many", "spread"]
-
 
 class Place(TypedDict, total=False):
     """Where in a log something was found."""

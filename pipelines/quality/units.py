@@ -13,8 +13,6 @@ from pipelines.quality.motion import peak_speed
 from pipelines.quality.segments import torque_limit
 from pipelines.quality.subject import NotTested, Subject
 
-__all__ = ["TRUSTED", "UNIT_CHECKS", "degrees_or_motor"]
-
 TRUSTED = ("RRID-S05", "RRID-S07")  # not checked where the user vouches for the units
 
 

@@ -86,33 +86,33 @@ def test_a_signal_ends_with_a_summary_and_resume_ends_the_same(many: Path, tmp_p
 
 @pytest.mark.row("P13")
 def test_json_is_the_result_and_nothing_else(tmp_path: Path) -> None:
-    """One object on standard output; each log an item; a bad one is exit 4 in the words of its stage."""
-    write_log(tmp_path / "root/a.h5", small_log(samples=100))
-    write_log(tmp_path / "root/b.h5", small_log(samples=100))
-    (tmp_path / "root/b.h5").write_bytes((tmp_path / "root/b.h5").read_bytes()[:3000])
+    """One object on standard output; each folder an item; a bad one is exit 4 in the words of its stage."""
+    write_log(tmp_path / "root/a/a.h5", small_log(samples=100))
+    write_log(tmp_path / "root/b/b.h5", small_log(samples=100))
+    (tmp_path / "root/b/b.h5").write_bytes((tmp_path / "root/b/b.h5").read_bytes()[:3000])
     (tmp_path / "home").mkdir(mode=0o555)
-    done = rrrid("batch", "root", "--stage", "convert", "--each-log", "--json", cwd=tmp_path,
+    done = rrrid("batch", "root", "--stage", "convert", "--json", cwd=tmp_path,
                  env={"HOME": str(tmp_path / "home"), "DISPLAY": "", "TERM": "dumb"})
     assert done.returncode == 4
     result = json.loads(done.stdout)
     assert [(item["name"], item["status"], (item["error"] or {}).get("code")) for item in result["items"]] == [
-        ("a.h5", "ok", None), ("b.h5", "rejected", "RRID-F02")]
+        ("a", "ok", None), ("b", "rejected", "RRID-F02")]
     assert result == json.loads((tmp_path / "runs/several/root/batch/result.json").read_text())
-    assert (tmp_path / "runs/several/root/batch/items/a.h5/logs/a.parquet").is_file()
+    assert (tmp_path / "runs/several/root/batch/items/a/logs/a.parquet").is_file()
     assert "<html" in (tmp_path / "runs/several/root/batch/report.html").read_text()
     assert list((tmp_path / "home").iterdir()) == []
 
 
 @pytest.mark.parametrize(("words", "code"), [
     (("--stage", "inspekt"), "C01"), (("--shard", "5/4"), "C02"), (("--jobs", "0"), "C02"), (("--memory", "much"), "C02"),
-    (("--timeout", "-1"), "C02"), (("--on-error", "panic"), "C02"), (("--backend", "spark://x"), "C02"),
+    (("--timeout", "-1"), "C02"), (("--backend", "spark://x"), "C02"),
     (("--set", "convert.too=h5"), "C01")])
 def test_a_wrong_option_is_exit_2(tmp_path: Path, words: tuple[str, ...], code: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """C01, C02, C04: before anything is written."""
     from pipelines.errors import UsageError
     from rrrid_cli.main import call
 
-    write_log(tmp_path / "root/a.h5", small_log(samples=100))
+    write_log(tmp_path / "root/a/a.h5", small_log(samples=100))
     monkeypatch.chdir(tmp_path)
     stage = () if "--stage" in words else ("--stage", "convert")
     with pytest.raises(UsageError) as refused:
