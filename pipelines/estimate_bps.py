@@ -34,7 +34,7 @@ from pipelines.estimation.estimate import (
     refuse_unfit,
     with_cutoff,
 )
-from pipelines.estimation.identifiability import hard_to_see, not_separated
+from pipelines.estimation.identifiability import not_separated
 from pipelines.estimation.judgements import REMEDY, negative_viscous
 from pipelines.estimation.mean_period import averaged, doubts, residuals
 from pipelines.estimation.motion import Motions, Reconstructed, for_equations, reconstruct
@@ -269,7 +269,6 @@ def _result(
         consistency=checked,
         balance=power_balance(found),
         unresolved=found.unresolved.told(columns_in_words(names)),
-        hard_to_see=hard_to_see(found.solution, names),
         not_separated=not_separated(found.solution, found.std, names),
         convergence_samples=growth.samples,
         convergence=growth.beta,

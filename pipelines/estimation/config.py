@@ -162,7 +162,6 @@ class EstimateConfig:
 
     fewest: int = 200  # equations of a fit: ten a parameter of the RRR arm with friction
     fewest_of_joint: int = 20  # equations
-    stretches: int = 20  # of held-out logs, to see how far errors scatter
     mostly: float = 0.01  # of the samples saturated: that is why none is left
     parts: int = 40  # of the convergence series
     highest: float = RegressionConfig.highest  # of the rate, of a cut-off
@@ -263,11 +262,7 @@ class ResidualConfig:
     rare: float = 10.0  # times the mean, that a row counts at most at an angle hardly visited
     as_much: float = 0.9  # of what a curve over time shows of a cause
     bins: int = 96  # of a proof
-    most_bins: int = 768  # of a proof: a figure is six inches wide
     rows: int = 4  # of a bin, at least
-    fewest: int = 2  # of a bin where finer bins show more
-    finer: float = 0.02  # of the predicted power, that twice as many bins have to show
-    chance: float = 4.0  # standard deviations of what they show by chance
     shown: float = 0.2  # of the predicted power, that its means over a signal have to hold
     stretch: float = 2.0  # [s] of a proof over time
     seconds: float = 3.0  # of a simulated log that are shown at most

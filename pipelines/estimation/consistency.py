@@ -62,18 +62,17 @@ def consistency(found: Estimate, body: RigidBody) -> Consistent | None:
     """
     if not found.trusted[list(found.columns.rigid)].all():
         return None
-    count, kept = len(body.parameters), list(found.columns.kept)
+    kept = list(found.columns.kept)
     own = len(kept)
-    beta, covariance = np.zeros(count), np.zeros((count, count))
-    beta[kept] = found.beta[:own]
-    covariance[np.ix_(kept, kept)] = found.robust.covariance[:own, :own]
     if isinstance(body, RRR):
         combine = combined(body.robot)
     elif isinstance(body, BaseArm):
         combine = body.base.combine
     else:
         raise TypeError(f"no links are known behind a {type(body).__name__}")
-    answer = physical_consistency(beta[kept], covariance[np.ix_(kept, kept)], combine[kept])
+    answer = physical_consistency(
+        found.beta[:own], found.robust.covariance[:own, :own], combine[kept]
+    )
     names = tuple(body.robot.joints[i].name for i in answer.violating)
     return Consistent(answer.consistent, answer.distance, names)
 

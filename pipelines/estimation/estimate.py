@@ -22,7 +22,7 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.estimation.config import EstimateConfig
 from pipelines.estimation.covariance import Robust, robust_covariance
 from pipelines.estimation.filters import KEEP
-from pipelines.estimation.held_out import Stretches, by_blocks, by_stretches
+from pipelines.estimation.held_out import by_blocks
 from pipelines.estimation.identifiability import (
     Unresolved,
     condition_number,
@@ -39,6 +39,7 @@ from pipelines.estimation.least_squares import (
     Statistics,
     Triangles,
     convergence,
+    errors,
     fit,
     gather,
     gather_growing,
@@ -183,7 +184,6 @@ class Judged:
 
     errors: Errors
     by: str  # "logs" | "blocks"
-    stretches: Stretches  # of time, in order
     motions: Motions
     equations: tuple[LogEquations, ...]  # that judge; none where blocks of the fitted logs do
 
@@ -346,8 +346,8 @@ def fit_logs(
     equations = equations_of(motions, recipe, columns, rows)
     refuse_too_few(equations, motions)
     found = estimate(equations, columns, weighted)
-    errors = _of_whole_torque(found.solution.errors, equations)
-    return Fitted(found, motions, recipe, errors, weighted)
+    whole = _of_whole_torque(found.solution.errors, equations)
+    return Fitted(found, motions, recipe, whole, weighted)
 
 
 def judge(
@@ -365,12 +365,10 @@ def judge(
             triangles=isinstance(found.statistics, Triangles),
             weighted=fitted.weighted,
         )
-        return Judged(_of_whole_torque(left.errors, own), "blocks", left, (), ())
+        return Judged(_of_whole_torque(left, own), "blocks", (), ())
     equations = equations_of(motions, fitted.recipe, found.columns, rows)
-    samples, stretches = sum(one.samples for one in equations), max(blocks, _CONFIG.stretches)
-    left = by_stretches(Stacked(equations), samples, stretches, found.beta)
-    errors = _of_whole_torque(left.errors, equations)
-    return Judged(errors, "logs", left, motions, tuple(equations))
+    left = errors(gather(Stacked(equations)), found.beta)
+    return Judged(_of_whole_torque(left, equations), "logs", motions, tuple(equations))
 
 
 def _of_whole_torque(found: Errors, equations: Sequence[LogEquations]) -> Errors:

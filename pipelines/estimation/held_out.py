@@ -1,7 +1,4 @@
-"""Compute held-out errors by stretches of time: of other logs, or of the fitted ones in turn.
-
-    by_blocks(equations, samples, ...)      contiguous blocks held out once each
-    by_stretches(equations, samples, ...)   given parameters, judged stretch by stretch
+"""Compute held-out errors of contiguous blocks of the fitted logs, held out once each.
 
 One pass, memory constant in the number of samples: every part of the time leaves one small matrix,
 and the statistics of any rest are sums of those.
@@ -14,7 +11,6 @@ what they have seen (Burman, Chow & Nolan 1994). They are left out while that bl
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import reduce
 from itertools import accumulate, pairwise
 from operator import add
@@ -31,24 +27,8 @@ from pipelines.estimation.least_squares import (
     solve,
     triangulate,
 )
-from pipelines.io.log import Array
 
 _ASIDE = 8  # numerics: of the shortest logs an eighth is left out at most
-
-
-@dataclass(frozen=True, eq=False)
-class Stretches:
-    """What is left of the torque in each stretch of time, and what there was."""
-
-    rss: Array  # (stretches, channels) Σ (y - A β)²
-    power: Array  # (stretches, channels) Σ y²
-    counts: Indices  # (channels,) equations
-    samples: int
-
-    @property
-    def errors(self) -> Errors:
-        rss, power = self.rss.sum(axis=0), self.power.sum(axis=0)
-        return Errors.of(rss, power, self.counts, self.samples)
 
 
 def by_blocks(
@@ -59,7 +39,7 @@ def by_blocks(
     *,
     triangles: bool = False,
     weighted: bool = True,
-) -> Stretches:
+) -> Errors:
     """Hold contiguous blocks out once each: every one explained by parameters of the rest.
 
     Args:
@@ -84,17 +64,8 @@ def by_blocks(
         weights = None if weighted else np.ones(len(rest.power))
         rss.append(held.rss(solve(rest, weights=weights).beta))
         power.append(held.power)
-    return Stretches(np.array(rss), np.array(power), reduce(add, parts).counts, samples)
-
-
-def by_stretches(
-    equations: Iterable[Block], samples: int, stretches: int, beta: Array
-) -> Stretches:
-    """Return how β explains each of so many stretches of equal length."""
-    cuts = np.linspace(0, samples, min(stretches, samples) + 1).astype(np.intp)
-    parts = _parts(equations, cuts, gather)
-    rss, power = [part.rss(beta) for part in parts], [part.power for part in parts]
-    return Stretches(np.array(rss), np.array(power), reduce(add, parts).counts, samples)
+    totals = np.sum(rss, axis=0), np.sum(power, axis=0)
+    return Errors.of(*totals, reduce(add, parts).counts, samples)
 
 
 def _parts(

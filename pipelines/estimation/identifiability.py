@@ -3,7 +3,6 @@
     condition_number(statistics)         of Φ itself: no weights, no scaling
     unresolved(solution, names)          which parameters cannot be separated, in words
     not_separated(solution, std, names)  groups of parameters that are determined only together
-    hard_to_see(solution, names)         the weakest directions, strongest columns first
     visible(value, std, typical)         parameters worth printing as a number
 
 Directions are those of columns scaled to unit length: what one of them weighs is its torque, not
@@ -22,14 +21,6 @@ from pipelines.estimation.least_squares import Flags, Solution, Statistics
 from pipelines.io.log import Array
 
 _CONFIG = IdentifiabilityConfig()
-
-
-@dataclass(frozen=True)
-class Direction:
-    """A combination of parameters, by the share that each column has in its torque."""
-
-    singular_value: float  # of columns of unit length; 1 is a column on its own
-    parameters: tuple[tuple[str, float], ...]  # the largest first; squares of shares sum to one
 
 
 @dataclass(frozen=True)
@@ -141,18 +132,6 @@ def not_separated(
             own, links = own | group[0], links | group[1]
         groups.append((own, links))
     return tuple(tuple(names[k] for k in sorted(own)) for own, _ in groups if len(own) > 1)
-
-
-def hard_to_see(solution: Solution, names: Sequence[str], count: int = 3) -> tuple[Direction, ...]:
-    """Return the `count` weakest directions, the weakest first."""
-    found = []
-    pairs = zip(solution.singular_values, solution.directions, strict=True)
-    for s, v in list(pairs)[::-1][:count]:
-        order = np.argsort(-np.abs(v), kind="stable").tolist()
-        sign = np.sign(v[order[0]])
-        shown = [k for k in order if abs(v[k]) >= _CONFIG.named]
-        found.append(Direction(float(s), tuple((names[k], float(sign * v[k])) for k in shown)))
-    return tuple(found)
 
 
 def typical_size(value: Array, std: Array, groups: Sequence[str]) -> Array:

@@ -59,16 +59,6 @@ class Series:
 
 
 @dataclass(frozen=True)
-class MeanResult:
-    """How well the mean period is known; an estimate takes its equations from it. Per joint."""
-
-    periods: int  # averaged
-    position_std: Array  # in the middle of all samples
-    speed_std: Array
-    acceleration_std: Array
-
-
-@dataclass(frozen=True)
 class LogResult:
     """One log. Every array is per joint, in SI units (m for prismatic joints)."""
 
@@ -93,7 +83,6 @@ class LogResult:
     speed_std: Array
     acceleration_std: Array
     noise_floor: NoiseFloor | None  # between the periods of a periodic log
-    mean: MeanResult | None  # of its periods, where they are averaged
     series: Series | None
     log: ExperimentLog = field(metadata=NOT_STORED, repr=False)
 
@@ -145,7 +134,8 @@ def assess(
     if "q_ref" in found.good.log and np.isfinite(found.good.log["q_ref"][longest]).all():
         reference = found.good.log["q_ref"]
     smoothing = tuned.smoothing
-    floor, mean = _periods(log, seen, found)
+    rate = 1.0 / seen.step
+    cutoff = cutoff_at(wanted_cutoff(found.motion, rate), rate)
     return LogResult(
         log.name,
         names[0],
@@ -171,8 +161,7 @@ def assess(
         np.abs(found.motion.dq[moved]).max(axis=0),
         np.abs(found.motion.ddq[moved]).max(axis=0),
         *_typical_std(found),
-        floor,
-        mean,
+        mean_period(log, found, cutoff)[0],
         _series(seen, found, error, longest) if draw else None,
         derived,
     )
@@ -195,17 +184,6 @@ def _typical_std(found: Reconstructed) -> tuple[Array, Array, Array]:
     none = (np.full_like(found.motion.q, np.nan),) * 3
     q, dq, ddq = (np.median(std, axis=0) for std in found.std or none)
     return q, dq, ddq
-
-
-def _periods(
-    log: ExperimentLog, seen: Measured, found: Reconstructed
-) -> tuple[NoiseFloor | None, MeanResult | None]:
-    """Return what differs between periods, with the low-pass of an estimate, and their mean."""
-    rate = 1.0 / seen.step
-    floor, mean = mean_period(log, found, cutoff_at(wanted_cutoff(found.motion, rate), rate))
-    if floor is None or mean is None:
-        return floor, None
-    return floor, MeanResult(floor.periods, *_typical_std(mean[1]))
 
 
 def _whiteness(seen: Measured, observer: Observer) -> tuple[Array, Array]:

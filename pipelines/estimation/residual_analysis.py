@@ -3,13 +3,9 @@
     evidence(fit, floor)              the residual over time, and against all that it may depend on
     proof(before, after, joint, …)    of the joint that shows most of a finding
 
-Amplitudes over the orders of an angle: a joint that goes to and fro over a part of a turn is longer
-at some angles than at others, and the mean of x e^(-jkq) shows the shape of that about every order.
-So every angle counts alike, and less towards the ends of the range (von Hann's window): what
-remains about an order is some 3 % of it, beyond two waves of the range on either side. With these
-weights a constant and one wave are fitted at a time:
-
-    min Σ w(q) (x - a - b cos kq - c sin kq)²        amplitude √(b² + c²)
+A joint that goes to and fro over a part of a turn is longer at some angles than at others.
+Amplitudes over the orders of an angle let every angle count alike, and less towards the ends of the
+range (von Hann's window): 2 |Σ w(q) x e^(-jkq)| / Σ w(q), x less its mean.
 """
 
 from __future__ import annotations
@@ -28,7 +24,6 @@ from pipelines.io.log import Array
 from pipelines.simulation.comparison import Simulation
 
 _CONFIG = ResidualConfig()
-_ALIKE = 1e-6  # numerics: of the largest eigenvalue, below which a wave is a constant
 _ORDERS = np.arange(0.5, 80.25, 0.25)  # [1/rev]
 
 
@@ -121,10 +116,11 @@ class Binned:
         return float(np.sum(self.count * self.mean**2))
 
 
-def binned(x: Array, y: Array, bins: int = _CONFIG.curve_bins, least: int = _CONFIG.rows) -> Binned:
-    """Return `y` over `x`, in bins of equal count, of `least` rows or more."""
+def binned(x: Array, y: Array, bins: int = _CONFIG.curve_bins) -> Binned:
+    """Return `y` over `x`, in bins of equal count."""
     order = np.argsort(x, kind="stable")
-    edges = np.linspace(0, len(x), min(bins, max(1, len(x) // least)) + 1).astype(int)
+    count = min(bins, max(1, len(x) // _CONFIG.rows))
+    edges = np.linspace(0, len(x), count + 1).astype(int)
     first, count = edges[:-1], np.diff(edges).astype(np.float64)
     mean_x, mean, square = (np.add.reduceat(v[order], first) / count for v in (x, y, y**2))
     return Binned(mean_x, mean, np.sqrt(np.maximum(square - mean**2, 0.0)), count)
@@ -161,46 +157,24 @@ def _travel(one: LogData, joint: int) -> Array:
     return np.asarray(one.at_rows(q - q[begin[which]]))
 
 
-def least_order(q: Array) -> float:
-    """Return the lowest order [1/rev] that is resolved; infinite where the joint stood still."""
-    span = float(np.ptp(q)) if len(q) else 0.0
-    return _CONFIG.waves * 2.0 * np.pi / span if span > 0.0 else np.inf
+def amplitudes(q: Array, x: Array) -> tuple[Array, Array]:
+    """Return the resolved orders [1/rev] and the amplitude of each wave over the angle q in x.
 
-
-def amplitudes(q: Array, x: Array, orders: Array) -> Array:
-    """Return the amplitude (orders,) of each wave over the angle q (rows,) in x (rows,).
-
-    Zero of a joint that stood still.
-
-    Args:
-        orders: evenly spaced.
+    Both (rows,). None where the joint stood still.
     """
-    if not np.isfinite(least_order(q)):
-        return np.zeros(len(orders))
-    weight, spacing = _weights(q, float(np.max(orders))), np.ptp(orders) / max(len(orders) - 1, 1)
-    wave, step, sums = np.exp(1j * orders[0] * q), np.exp(1j * spacing * q), []
-    for _ in orders:  # of w e^(jkq), w e^(2jkq) and w x e^(jkq)
-        weighted = weight * wave
-        sums.append((weighted.sum(), weighted @ wave, weighted @ x))
-        wave = wave * step
-    one, two, own = np.transpose(sums)
-    whole, level = np.full(len(orders), weight.sum()), np.full(len(orders), weight @ x)
-    cc, cs, ss = 0.5 * (whole + two.real), 0.5 * two.imag, 0.5 * (whole - two.real)
-    normal = np.array([[whole, one.real, one.imag], [one.real, cc, cs], [one.imag, cs, ss]])
-    inverse = np.linalg.pinv(np.moveaxis(normal, -1, 0), rcond=_ALIKE, hermitian=True)
-    fitted = np.einsum("kij,jk->ki", inverse, np.array([level, own.real, own.imag]))
-    return np.asarray(np.hypot(fitted[:, 1], fitted[:, 2]))
-
-
-def _weights(q: Array, highest: float) -> Array:
-    """Return von Hann's window (rows,) over the range, shared by the rows at the same angle."""
-    along = (q - q.min()) / np.ptp(q)
-    parts = max(1, int(np.ceil(float(np.ptp(q)) * highest / (2.0 * np.pi * _CONFIG.part))))
+    span = float(np.ptp(q)) if len(q) else 0.0
+    if span <= 0.0:
+        return _ORDERS[:0], _ORDERS[:0]
+    orders = _ORDERS[_CONFIG.waves * 2.0 * np.pi / span <= _ORDERS]
+    along = (q - q.min()) / span
+    parts = max(1, int(np.ceil(span * _ORDERS[-1] / (2.0 * np.pi * _CONFIG.part))))
     part = np.minimum((along * parts).astype(int), parts - 1)
     count = np.bincount(part, minlength=parts)[part]
-    return np.asarray(
-        np.sin(np.pi * along) ** 2 * np.minimum(1.0 / count, _CONFIG.rare * parts / len(q))
-    )
+    weight = np.minimum(1.0 / count, _CONFIG.rare * parts / len(q))
+    weight *= np.sin(np.pi * along) ** 2
+    rest = weight * (x - weight @ x / max(float(weight.sum()), 1e-300))
+    size = [abs(rest @ np.exp(-1j * order * q)) for order in orders]
+    return orders, 2.0 * np.asarray(size, dtype=np.float64) / max(float(weight.sum()), 1e-300)
 
 
 def evidence(done: Refined, floor: Array) -> Evidence:
@@ -240,11 +214,10 @@ def _spectra(data: Data, left: Array, joint: int) -> list[Spectrum]:
     own = _over_frequency(*max(parts, key=lambda part: len(part[1])))
     if own is not None:
         found.append(Spectrum(joint + 1, "frequency", "Hz", *own))
-    resolved = least_order(q) <= _ORDERS
-    if resolved.any():
+    orders, waves = amplitudes(q, left[data.joint == joint])
+    if len(orders):
         unit = "1/rev" if data.logs[0].log.robot.revolute[joint] else "1/(2 pi m)"
-        waves = amplitudes(q, left[data.joint == joint], _ORDERS)[resolved]
-        found.append(Spectrum(joint + 1, "order", unit, _ORDERS[resolved], waves))
+        found.append(Spectrum(joint + 1, "order", unit, orders, waves))
     return found
 
 
@@ -322,35 +295,10 @@ def _over(
     signal: Signal, parts: list[Array], joint: int, over_time: tuple[Array, Array, Array, Array]
 ) -> Proof:
     """Return `parts`, without the finding, with it and what it predicts, over a signal."""
-    bins = _fine_enough(signal.values, parts[2])
-    before, after, predicted = (binned(signal.values, x, bins, _CONFIG.fewest) for x in parts)
+    before, after, predicted = (binned(signal.values, x, _CONFIG.bins) for x in parts)
     curves = (before.x, before.mean, after.mean, predicted.mean)
     spread = before.spread / np.sqrt(before.count)
     return Proof(joint + 1, signal.name, signal.unit, *curves, spread, *over_time)
-
-
-def _fine_enough(x: Array, predicted: Array) -> int:
-    """Return as many bins as show what a cause predicts over x, as far as there are rows.
-
-    What scatters within a bin, and not along x, makes none of them finer.
-    """
-    bins = min(_CONFIG.bins, max(1, len(x) // _CONFIG.rows))
-    least, (here, _) = _CONFIG.finer * float(predicted @ predicted), _surely(x, predicted, bins)
-    while bins < _CONFIG.most_bins:
-        finer, chance = _surely(x, predicted, 2 * bins)
-        if finer - here <= max(least, _CONFIG.chance * chance):
-            break
-        bins, here = 2 * bins, finer
-    return bins
-
-
-def _surely(x: Array, y: Array, bins: int) -> tuple[float, float]:
-    """Return the power of the means less what they have by chance, and the deviation of that."""
-    means = binned(x, y, bins, _CONFIG.fewest)
-    chance = means.spread**2 * means.count / np.maximum(means.count - 1.0, 1.0)
-    # the mean of all bins: of pairs of rows one squared deviation is far from its mean
-    deviation = float(np.sqrt(2.0 * len(chance)) * np.mean(chance))
-    return float(np.sum(means.count * means.mean**2 - chance)), deviation
 
 
 def _stretch(data: Data, predicted: Array) -> tuple[Array, slice]:

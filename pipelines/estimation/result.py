@@ -13,7 +13,6 @@ from pipelines.estimation.checks.boundary import Boundary
 from pipelines.estimation.consistency import Consistent
 from pipelines.estimation.estimate import Fitted
 from pipelines.estimation.filters import choose_decimation, design_low_pass, zero_phase
-from pipelines.estimation.identifiability import Direction
 from pipelines.estimation.mean_period import PeriodicLog
 from pipelines.estimation.motion import Motions, Reconstructed
 from pipelines.estimation.regression import bridged, cutoff_at
@@ -76,7 +75,6 @@ class Result:
     consistency: Consistent | None
     balance: Balance | None
     unresolved: str  # words; empty where everything shows
-    hard_to_see: tuple[Direction, ...]
     # parameters determined only together
     not_separated: tuple[tuple[str, ...], ...] = field(default=(), kw_only=True)
     # [torque_units] held-out rms, no friction

@@ -78,14 +78,10 @@ def smooth(y: Array, observer: Observer, start: Start | None = None) -> Track:
 
 def smoothed_std(observer: Observer) -> Array:
     """Return the standard deviation far from ends and gaps: P - P Λ P. (order, joints)"""
-
-    def far() -> Array:
-        f = observer.filter
-        weight = information(observer, np.zeros_like(f.prior), f.settled)[:, -1:]
-        prior = f.prior[:, None]
-        return observer.deviations(prior - prior @ weight @ prior)[:, 0]
-
-    return observer.kept("smoothed", far)
+    f = observer.filter
+    weight = information(observer, np.zeros_like(f.prior), f.settled)[:, -1:]
+    prior = f.prior[:, None]
+    return observer.deviations(prior - prior @ weight @ prior)[:, 0]
 
 
 def twicing_growth(order: int) -> Array:
@@ -152,13 +148,7 @@ def _smooth_run(
     end = (weigh @ pull[..., None])[..., 0]
     adjoint = _stationary(observer, y, stretch.prior.mean, end, out)
     excess = observer.excess_of(stretch.prior.excess)
-    if samples >= 2 * reach and not later.information.any():  # no sample decides it
-        known, felt, covariance = observer.kept(
-            ("ends", excess.tobytes()),
-            lambda: _ends(observer, excess, np.zeros_like(f.prior), 2 * reach),
-        )
-    else:
-        known, felt, covariance = _ends(observer, excess, weigh @ later.information, samples)
+    known, felt, covariance = _ends(observer, excess, weigh @ later.information, samples)
     offset = spread_of(excess, known) @ adjoint[..., None]
     shifted = (felt @ offset[:, None])[..., 0].swapaxes(1, 2)
     out[:, :, : felt.shape[1]] += shifted * observer.rate[..., None]
@@ -226,38 +216,36 @@ def _stationary(observer: Observer, y: Run, mean: Array, end: Array, out: Array)
     """Smooth a run from state `mean` to λ `end`, into `out`; return λ at the start."""
     pieces = chunks(y.samples)
     means = [mean] if len(pieces) == 1 else advance(observer, y, mean)[:-1]
+    whole = _kernel(observer, BLOCK)
     for (a, b), before in zip(reversed(pieces), reversed(means), strict=True):
-        end = _chunk(observer, y.take(a, b), before, end, out[:, :, a:b])
+        end = _chunk(observer, whole, y.take(a, b), before, end, out[:, :, a:b])
         out[:, 0, a:b] += y.offset[:, None]
     return end
 
 
-def _chunk(observer: Observer, y: Array, mean: Array, end: Array, out: Array) -> Array:
+def _chunk(
+    observer: Observer, whole: _Kernel, y: Array, mean: Array, end: Array, out: Array
+) -> Array:
     """Smooth `y` (joints, samples) at once: blocks forward, blocks backward, and all states."""
     n = observer.order
     blocks, after = block_starts(observer, y, mean, spare=n)
     count = blocks.shape[1]
     rest = y.shape[1] - count * BLOCK
     if rest:
-        kernel = _kernel_of(observer, rest)
+        kernel = _kernel(observer, rest)
         tail = np.concatenate([y[:, -rest:], after, end], axis=1)[:, None]
         out[:, :, -rest:] = (tail[:, None] @ kernel.states)[:, :, 0]
         end = (tail[:, :, :-n] @ kernel.adjoint)[:, 0] + (end[:, None] @ kernel.across)[:, 0]
     if count:
-        kernel = _kernel_of(observer, BLOCK)
         drive = np.empty((len(y), count + 1, n))  # from the last block to the first
         drive[:, 0] = end
-        drive[:, 1:] = (blocks[:, :, :-n] @ kernel.adjoint)[:, ::-1]
-        chain.scan(kernel.across.swapaxes(1, 2), drive)
+        drive[:, 1:] = (blocks[:, :, :-n] @ whole.adjoint)[:, ::-1]
+        chain.scan(whole.across.swapaxes(1, 2), drive)
         blocks[:, :, -n:] = drive[:, -2::-1]
         target = out[:, :, : count * BLOCK].reshape(*out.shape[:2], count, BLOCK)
-        np.matmul(blocks[:, None], kernel.states, out=target)
+        np.matmul(blocks[:, None], whole.states, out=target)
         end = drive[:, -1]
     return end
-
-
-def _kernel_of(observer: Observer, size: int) -> _Kernel:
-    return observer.kept(("kernel", size), lambda: _kernel(observer, size))
 
 
 def _kernel(observer: Observer, size: int) -> _Kernel:

@@ -14,10 +14,9 @@ Missing samples are predicted through, never interpolated.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -27,11 +26,9 @@ from pipelines.estimation import chain
 from pipelines.estimation.chain import Array, Stationary
 
 Indices = npt.NDArray[np.intp]
-T = TypeVar("T")
 
 BLOCK = 32  # numerics: samples; longer blocks cost arithmetic, shorter ones carries
 CHUNK = 512 * BLOCK  # numerics: samples worked on at once
-_KEPT = 24  # numerics: starts, ends and lengths whose matrices are kept
 _DIFFUSE = 1e5  # numerics: noise in position, of a start that knows nothing; as much a derivative
 
 
@@ -202,33 +199,13 @@ class Observer:
         inside = chain.impulse_toeplitz(pulse)  # (joints, state, B, B)
         return power, leave, np.concatenate([inside, free], axis=2) * self.rate[..., None, None]
 
-    @cached_property
-    def _store(self) -> dict[Hashable, Any]:
-        return {}
-
-    def kept(self, key: Hashable, make: Callable[[], T]) -> T:
-        """Return what `make` gives, or gave before under the same key; only a few are kept."""
-        if key not in self._store:
-            if len(self._store) >= _KEPT:
-                self._store.clear()
-            self._store[key] = make()
-        found: T = self._store[key]
-        return found
-
     def opening(self, excess: Array | None, count: int) -> Opening:
-        """Return to the stationary gain over `count` samples from a start of covariance P + D.
-
-        No sample decides it: logs that start alike share it, as gaps of one length do.
-        """
-        start = self.excess_of(excess)
-        return self.kept(("opening", start.tobytes(), count), lambda: self._open(start, count))
-
-    def _open(self, excess: Array, count: int) -> Opening:
+        """Return to the stationary gain over `count` samples from a start of covariance P + D."""
         f = self.filter
         power = chain.powers(f.predictor, count)
         row = power[:, :count, 0]  # c A^k
         known = row[..., :, None] * (row * f.remainder[:, None, None])[..., None, :]
-        spread = spread_of(excess, np.cumsum(known, axis=1))
+        spread = spread_of(self.excess_of(excess), np.cumsum(known, axis=1))
         felt = f.updater[:, None] @ power[:, :count]
         covariance = f.posterior[:, None] + felt @ spread @ felt.swapaxes(2, 3)
         return Opening(power, spread, felt, self.deviations(covariance))
@@ -252,8 +229,7 @@ class Observer:
         names = [name for name in Stationary.__dataclass_fields__ if name != "order"]
         part = replace(f, **{name: getattr(f, name)[joints] for name in names})
         sigma, variance = self.jerk_std[joints], self.noise_variance[joints]
-        own = Observer(self.sample_time, sigma, variance, part)
-        return self.kept(("joints", joints.tobytes()), lambda: own)
+        return Observer(self.sample_time, sigma, variance, part)
 
 
 def design(

@@ -277,15 +277,7 @@ def _course_section(result: Result) -> Section:
 
 
 def _trust_section(result: Result) -> Section:
-    weak = tuple(
-        (
-            d.singular_value,
-            " ".join(f"{_signed(weight)} {_within(name)}" for name, weight in d.parameters[:4]),
-        )
-        for d in result.hard_to_see
-    )
-    caption = "The directions that these logs show worst; 1 is a column on its own."
-    tables = [Table(("singular value", "combination"), weak, caption)]
+    tables = []
     if result.balance is not None:
         tables.append(_balance_table(result, result.balance))
     text = (

@@ -224,9 +224,6 @@ def _floor_table(log: LogResult, noise: NoiseFloor) -> Table:
         below = f"below {format_number(noise.cutoff_hz, 3)} Hz"
         floor[f"position {below} [{unit}]"] = noise.position_low_pass.tolist()
         floor[f"torque {below} [{torque}]"] = noise.torque_low_pass.tolist()
-    if log.mean is not None:
-        floor[f"std dq of the mean [{unit}/s]"] = log.mean.speed_std.tolist()
-        floor[f"std ddq of the mean [{unit}/s^2]"] = log.mean.acceleration_std.tolist()
     what = "standard deviation of one sample of one period, by what differs between periods"
     return columns_table(floor, f"Noise floor: {what}.")
 

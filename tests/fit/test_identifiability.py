@@ -8,7 +8,6 @@ import pytest
 from pipelines.estimation.identifiability import (
     _resolved,
     condition_number,
-    hard_to_see,
     typical_size,
     unresolved,
     visible,
@@ -71,19 +70,6 @@ def test_noise_decides_what_is_dependent(difference: float, loudness: float, ran
     found = solution(Y, one.beta, loudness)
     assert _resolved(found, 1.0).sum() == rank
     assert unresolved(found, NAMES).confused == ((("b4", "b5"),) if rank < WIDTH else ())
-
-
-def test_the_weakest_direction_is_read_out() -> None:
-    """Of two columns that are alike the difference is hardest to see, and that is what is said."""
-    one = problem()
-    Y = one.Y.copy()
-    Y[:, :, 5] = 2.0 * Y[:, :, 4] + 0.02 * Y[:, :, 5]
-    weakest, *others = hard_to_see(solution(Y, one.beta), NAMES)
-    assert {name for name, _ in weakest.parameters} == {"b4", "b5"}
-    (_, first), (_, second) = weakest.parameters
-    assert first == pytest.approx(0.707, abs=0.01)
-    assert second == pytest.approx(-0.707, abs=0.01)
-    assert weakest.singular_value < 0.05 * others[0].singular_value
 
 
 def test_visible_or_not() -> None:
