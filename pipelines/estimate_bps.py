@@ -40,6 +40,8 @@ from pipelines.estimation.mean_period import averaged, doubts, residuals
 from pipelines.estimation.motion import Motions, Reconstructed, for_equations, reconstruct
 from pipelines.estimation.nominal import columns_in_words, fitted_arm, nominal_columns
 from pipelines.estimation.observers import Reconstruction
+from pipelines.estimation.regression import Rows
+from pipelines.estimation.rests import moving_rows
 from pipelines.estimation.result import Result, course, parameters, validity
 from pipelines.estimation.result import torques as torque_parts
 from pipelines.io.files import write_log
@@ -141,8 +143,10 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     even = for_equations((*motions, *judges))
     recipe = with_cutoff(recipe, even[: len(motions)])
     means, scatter = averaged(even, recipe.cutoff_hz)
-    fitted = fit_logs(means[: len(motions)], columns, recipe, settings.weighted)
-    judged = judge(fitted, means[len(motions) :], settings.blocks)
+    first = len(motions)
+    rows = moving_rows(means, first, columns, recipe, settings.weighted)
+    fitted = fit_logs(means[:first], columns, recipe, settings.weighted, rows[:first])
+    judged = judge(fitted, means[first:], settings.blocks, rows[first:])
     arm = fitted_arm(
         fitted.estimate, identify[0].robot_name, () if given is None else given.friction
     )
@@ -159,11 +163,13 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         boundary=boundary,
         data_quality=(*said_of_torque, *said, *said_too, *said_of_periods),
         noise_floor=residuals(scatter, fitted, judged, logs),
-        rigid_body_alone=_rigid_body_alone(fitted, means, settings),
+        rigid_body_alone=_rigid_body_alone(fitted, means, rows, settings),
     )
 
 
-def _rigid_body_alone(fitted: Fitted, means: Motions, settings: Settings) -> tuple[float, ...]:
+def _rigid_body_alone(
+    fitted: Fitted, means: Motions, rows: list[Rows], settings: Settings
+) -> tuple[float, ...]:
     """Return the held-out error (joints,) of the rigid body fitted without friction and offset."""
     identify = len(fitted.motions)
     columns = nominal_columns(
@@ -173,10 +179,10 @@ def _rigid_body_alone(fitted: Fitted, means: Motions, settings: Settings) -> tup
         rotor_inertia=settings.rotor_inertia,
         symmetric=settings.symmetric,
     )
-    alone = fit_logs(
-        means[:identify], columns, replace(fitted.recipe, known=None), settings.weighted
-    )
-    return tuple(map(float, judge(alone, means[identify:], settings.blocks).errors.rms))
+    recipe = replace(fitted.recipe, known=None)
+    alone = fit_logs(means[:identify], columns, recipe, settings.weighted, rows[:identify])
+    judged = judge(alone, means[identify:], settings.blocks, rows[identify:])
+    return tuple(map(float, judged.errors.rms))
 
 
 def _accepted(logs: list[ExperimentLog]) -> list[tuple[Subject, list[Check]]]:

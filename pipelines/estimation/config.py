@@ -185,7 +185,9 @@ class RestConfig:
     """Limits of a rest, and of leaving it out."""
 
     still: float = 0.2  # hypot of speed and acceleration over their rms; .1 to .3 are alike
+    memory: float = 0.05  # [s] a rest lasts at least, where no low-pass has a longer period
     more: float = 2.0  # times the residual of the motion, that a rest held by friction leaves
+    least: int = 20  # equations of a joint that have to remain
 
 
 @dataclass(frozen=True)

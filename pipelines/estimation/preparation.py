@@ -39,6 +39,7 @@ from pipelines.estimation.motion import Motions, Reconstructed, reconstruct
 from pipelines.estimation.nominal import nominal_columns, with_offsets
 from pipelines.estimation.nominal_fit import fit_nominal
 from pipelines.estimation.regression import Columns, cutoff_at
+from pipelines.estimation.rests import lasting, slowness
 from pipelines.estimation.rows import Data, gather
 from pipelines.estimation.state_estimation import design
 from pipelines.estimation.tuning import smoother_bandwidth
@@ -101,31 +102,6 @@ class Prepared:
     judge: Data | None  # None: blocks of the fitted ones judge
     reference: Data | None
     fewer: tuple[FewerTerms, ...] = ()  # laws that were replaced by plainer ones
-
-
-def slowness(motions: Sequence[Reconstructed]) -> list[Array]:
-    """Return hypot of speed and acceleration (kept samples, joints), over their rms in all."""
-    parts = [[x[found.good.kept] for x in (found.motion.dq, found.motion.ddq)] for found in motions]
-    rms = [np.sqrt(np.mean(np.vstack(part) ** 2, axis=0)) for part in zip(*parts, strict=True)]
-    speed, acceleration = (np.maximum(size, 1e-300) for size in rms)
-    return [np.hypot(dq / speed, ddq / acceleration) for dq, ddq in parts]
-
-
-def lasting(still: Mask, least: float, reach: int, deep: Mask | None = None) -> Mask:
-    """Return the stretches (samples, joints) of more than `least` samples, `reach` wider.
-
-    Args:
-        deep: of which they shall hold as many samples; by default all.
-    """
-    deep = still if deep is None else deep
-    out = np.zeros(still.shape, dtype=bool)
-    for j in range(still.shape[1]):
-        count = np.cumsum(np.append(0, deep[:, j]))
-        edges = np.flatnonzero(np.diff(np.pad(still[:, j].astype(np.int8), 1))).reshape(-1, 2)
-        for start, stop in edges.tolist():
-            if count[stop] - count[start] > least:
-                out[max(0, start - reach) : stop + reach, j] = True
-    return out
 
 
 def rests(motions: Motions, cutoff_hz: float | None, fastest: Array) -> list[Mask]:

@@ -19,7 +19,7 @@ from pipelines.io.files import open_log
 from pipelines.io.log import ExperimentLog
 from pipelines.quality.checks import Subject, check_log
 from pipelines.stage import Request, run_stage
-from tests.estimate_bps.test_other_arms import COULOMB, an_arm, recorded
+from tests.estimate_bps.test_other_arms import COULOMB, an_arm, deviations, estimated, recorded
 
 
 @pytest.mark.parametrize("case", ["a", pytest.param("b", marks=pytest.mark.slow)])
@@ -59,6 +59,16 @@ def test_kr300_rests_do_not_spoil_the_fit(shared: Path) -> None:
     assert not [check for one in found for check in one.data_quality if check.code == "RRID-T06"]
     for one in found:
         assert any({"mz5", "torque_offset:5:offset"} <= set(group) for group in one.not_separated)
+
+
+def test_torque_that_friction_holds_at_rest_is_no_equation() -> None:
+    """Before it moves the arm rests for 3 s at any torque that dry friction bears; its parameters come out all the same."""
+    arm, phi = an_arm("two")
+    log = recorded(arm)
+    held = log.tau[0] + np.array([1.6, -0.9]) * COULOMB
+    found = estimated(resting(log, 3.0, held))
+    assert np.sqrt(np.mean(np.square(deviations(found, arm, phi)))) < 1.6
+
 
 
 def test_samples_that_are_repeated_under_new_stamps_are_named(shared: Path, tmp_path: Path) -> None:
