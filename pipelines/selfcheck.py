@@ -150,7 +150,7 @@ def _fitted(log: ExperimentLog, close: float = 6.0) -> str:
     from pipelines.estimate_bps import Settings, compute
     from pipelines.simulation.example import example_arm
 
-    found = compute(Inputs((Opened(Path("log"), "", log, ()),)), Settings(compare=False))
+    found = compute(Inputs((Opened(Path("log"), "", log, ()),)), Settings())
     truth = {parameter.name: parameter.value for parameter in example_arm().base}
     away = [
         abs(one.value - truth[one.name]) / one.std

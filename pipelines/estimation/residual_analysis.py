@@ -119,8 +119,7 @@ class Binned:
 def binned(x: Array, y: Array, bins: int = _CONFIG.curve_bins) -> Binned:
     """Return `y` over `x`, in bins of equal count."""
     order = np.argsort(x, kind="stable")
-    count = min(bins, max(1, len(x) // _CONFIG.rows))
-    edges = np.linspace(0, len(x), count + 1).astype(int)
+    edges = np.linspace(0, len(x), min(bins, max(1, len(x) // _CONFIG.rows)) + 1).astype(int)
     first, count = edges[:-1], np.diff(edges).astype(np.float64)
     mean_x, mean, square = (np.add.reduceat(v[order], first) / count for v in (x, y, y**2))
     return Binned(mean_x, mean, np.sqrt(np.maximum(square - mean**2, 0.0)), count)

@@ -19,7 +19,7 @@ from pipelines.report.figures import Array, compared_figure, legend_above, one_f
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone, columns_table
 from pipelines.report.sections import boundary_card
 from pipelines.report.sentences import paragraphs, sentence
-from pipelines.report.style import enumerated, format_number, format_unit, printable, with_std
+from pipelines.report.style import enumerated, format_unit, printable, with_std
 from pipelines.report.words import figure_in_words, joined
 
 if TYPE_CHECKING:
@@ -115,10 +115,6 @@ def _seen(p: Estimated) -> str:
     if not p.visible:
         return "barely"
     return "clearly" if abs(p.value) > REPORT.sure * p.std else "known to be small"
-
-
-def _signed(x: float) -> str:
-    return f"{'+' if x > 0.0 else ''}{format_number(x, 2)}"
 
 
 def _formula(text: str) -> str:
