@@ -42,7 +42,7 @@ _CUT = 3  # numerics: causes named of those that --max-causes cut off
 
 @dataclass(frozen=True)
 class Settings:
-    """Which logs do what, what is left out, and how long to look."""
+    """Options of the diagnosis: roles of logs, excluded causes, length of the search."""
 
     identify: tuple[str, ...] = ()  # paths of logs to fit, instead of those that say so
     validate: tuple[str, ...] = ()  # that judge
@@ -67,7 +67,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Material:
-    """What was read beside the logs."""
+    """The model that was read beside the logs."""
 
     arm: Arm | None
     tell: Callable[[str], None]

@@ -73,7 +73,7 @@ def did_you_mean(word: str, known: Iterable[str], most: int = 1, near_by: float 
 
 
 class RrridError(Exception):
-    """What went wrong, with a stable code, a place and a remedy.
+    """An error with a stable code, a place and a remedy.
 
     Args:
         code: row of the table of bad inputs, without the prefix: "F01".
@@ -133,7 +133,7 @@ def _rebuild(
 class Check:
     """One named check of an input and what it found, in the words of an error; the work goes on.
 
-    "warn" continues, "repair" continues on data that had to be mended (an error under --strict),
+    "warn" continues, "repair" continues on repaired data (an error under --strict),
     "reject" is what the same input costs when a stage other than `inspect` meets it. `gate` marks
     what --check answers with exit 1.
     """
@@ -193,7 +193,7 @@ class NothingMatched(RrridError):
 
 
 class EnvironmentFault(RrridError):
-    """The machine stands in the way: disk full, no permission, a lock."""
+    """A fault of the machine: disk full, no permission, a lock."""
 
     exit_code = 6
 

@@ -76,7 +76,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Material:
-    """What was read beside the logs."""
+    """The model and causes that were read beside the logs."""
 
     arm: Arm | None
     tell: Callable[[str], None]
@@ -171,7 +171,7 @@ def _wanted(
     """Return the causes to extend the model by.
 
     Raises:
-        NothingMatched: C06, there is none.
+        NothingMatched: C06, no such log.
     """
     if before is not None and not settings.causes:
         return _found(before, label)

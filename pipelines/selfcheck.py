@@ -36,7 +36,7 @@ _EXTRAS = ("", "bench", "cluster", "export")
 
 @dataclass(frozen=True)
 class Finding:
-    """What was examined, and what to do where it is not in order."""
+    """One examination, and what to do where it failed."""
 
     name: str
     level: Level

@@ -1,1 +1,1 @@
-"""What the reader sees. The only door to matplotlib and jinja2."""
+"""Draw and write reports; the only package that imports matplotlib and jinja2."""

@@ -57,7 +57,7 @@ class Residual:
 
 @dataclass(frozen=True)
 class Answer:
-    """What both say in words."""
+    """Return the verdicts of both results."""
 
     what: str
     a: str
@@ -86,7 +86,7 @@ class Comparison:
         str, ...
     ] = ()  # laws and effects that only the first was fitted with, as commands take them
     effects_b: tuple[str, ...] = ()  # that only the second has
-    same: bool = False  # the two are one, to the last digit
+    same: bool = False  # both are equal
     robots: tuple[str, str] = ("", "")  # whose results they are; empty where unknown
 
 
@@ -135,7 +135,7 @@ def _in_words(effects: Sequence[str]) -> str:
 
 
 def _follows_from_effects(one: Answer, result: Comparison) -> bool:
-    """Whether two lists of findings differ by the effects that only one has, and nothing else."""
+    """Return whether two lists of findings differ only by effects that one of them has."""
     apart = set(one.a.split(", ")) ^ set(one.b.split(", "))
     return apart - {"none"} <= {*result.effects_a, *result.effects_b}
 

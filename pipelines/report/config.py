@@ -30,7 +30,7 @@ class ReportConfig:
     partly_followed: float = 0.8
     coherent: float = 0.5  # coherence of measured points of a response that are drawn
     scaled_by: float = 0.3  # coherence of the points that set the scale of its axis
-    method_off: float = 0.03  # relative, beyond noise, from which a method is said to be off
+    method_off: float = 0.03  # relative, beyond noise, from which the report calls a method off
     good_speed: float = 0.05  # of the speed error without friction, that a good law leaves
     good_torque: float = 0.1  # of held-out torque, where nothing was simulated: the same
     near_rest: float = 0.04  # of the fastest speed, below which friction changes its sign

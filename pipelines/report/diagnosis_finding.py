@@ -1,4 +1,4 @@
-"""What a report says of one finding: what to check, its worth, its proof, its numbers."""
+"""Report one finding: what to check, its worth, its proof, its numbers."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def finding_section(
     beside: Sequence[Finding] = (),
     left: Array | None = None,
 ) -> Section:
-    """What it is, what to check, what it is worth, and the figures that prove it.
+    """Return the explanation, what to check, the worth, and the figures that prove it.
 
     Args:
         nominal: residual of the model without any finding, and the floor of the held-out logs.
@@ -157,7 +157,7 @@ def _own_share(one: Finding, nominal: ResidualRms) -> float:
 def numbers_section(
     number: int, one: Finding, units: Units = _TURNING, every: Sequence[Finding] = ()
 ) -> Section:
-    """What was identified and what it gains, joint by joint.
+    """Return the identified numbers and their gain, joint by joint.
 
     Args:
         every: findings of the report; those of frequency responses are taken out before a search.

@@ -75,7 +75,7 @@ def _above_floor(found: Diagnosis, one: Evidence, rated: Sequence[float], units:
 
 
 def _signals(one: Evidence) -> Table:
-    """What of each joint's residual goes with which signal."""
+    """Return the share of each joint's residual that follows each signal."""
     joints = sorted({c.joint for c in one.curves})
     share = {(c.against, c.joint): c.explained for c in one.curves}
     most: dict[str, float] = {}

@@ -104,7 +104,7 @@ def diagnosis_report(result: Result) -> Report:
 
 
 def _tone(result: Result) -> Tone:
-    """What healthy machines have as well is a fault only where it changed or may be another."""
+    """Return the tone; what healthy machines have as well is a fault only where it changed."""
     causes = [one.cause for one in result.findings]
     causes += [other.cause for one in result.findings for other in one.alternatives]
     ordinary = all(find_effect(cause).parameters.healthy == math.inf for cause in causes)
@@ -123,7 +123,7 @@ def _verdict(result: Result) -> str:
 
 
 def _advice(result: Result) -> tuple[str, ...]:
-    """What to check on the machine, of causes whose line has no room for it."""
+    """Return what to check on the machine, of causes whose line has no room for it."""
     said = " ".join(headlines(result))
     several = len(result.findings) > 1
     return tuple(
@@ -202,7 +202,7 @@ def _unknown(result: Result) -> list[Section]:
 
 
 def _nearest(candidates: Iterable[Trial]) -> dict[tuple[str, int | None], float]:
-    """What each cause takes off the residual at most; to first order where it was not fitted."""
+    """Return the largest gain of each cause; to first order where it was not fitted."""
     found: dict[tuple[str, int | None], float] = {}
     for t in candidates:
         gain = t.exact_gain if math.isfinite(t.exact_gain) else t.gain
@@ -353,7 +353,7 @@ def extension_report(result: Extension) -> Report:
 
 
 def _extension_now(result: Extension) -> str:
-    """Whose error "now" is, as the same figure of `diagnose` may differ from it."""
+    """Return which model the column "now" is of; `diagnose` may give another figure."""
     if not result.findings:
         return ""
     loads = [o for o in result.findings if o.origin == "base parameters"]

@@ -62,7 +62,7 @@ def _smaller(result: Result) -> str:
 
 
 def _are_rivals(found: Apart | None) -> bool:
-    """Whether a diagnosis of the log would call the two causes alternatives."""
+    """Return whether a diagnosis of the log would call the two causes alternatives."""
     return found is not None and found.after.similarity > REPORT.alike
 
 
@@ -83,7 +83,7 @@ def _similarity(similarity: float) -> str:
 
 
 def _apart_section(found: Apart | None) -> Section | None:
-    """How well two causes can be told apart in it."""
+    """Return how well the motion separates two causes."""
     if found is None:
         return None
     judged = [("this design", found.after)]

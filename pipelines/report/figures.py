@@ -170,12 +170,12 @@ def one_figure(
 
 
 def draw_measured(axis: Axes, t: Array, x: Array) -> None:
-    """What was measured, broad and light: a model that lies on it leaves its borders to be seen."""
+    """Draw the measurement broad and light: its borders stay visible under a model."""
     axis.plot(t, x, color=style.SKY, linewidth=3.0, label="measured")
 
 
 def draw_modelled(axis: Axes, t: Array, x: Array, label: str) -> None:
-    """What a model says of it, thin and dark, over what was measured."""
+    """Draw the prediction of a model thin and dark, over the measurement."""
     axis.plot(t, x, color=style.VERMILLION, linewidth=0.9, label=label)
 
 

@@ -124,7 +124,7 @@ def _draw_confidence(size: Axes, phase: Axes, curve: Curve) -> None:
 
 
 def outside(intervals: Sequence[Band], low: float, high: float) -> list[Band]:
-    """What of `low` to `high` [Hz] lies in none of the `intervals`."""
+    """Return the parts of `low` to `high` [Hz] outside all `intervals`."""
     edges = [low, *(edge for interval in intervals for edge in interval), high]
     return [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > a]
 

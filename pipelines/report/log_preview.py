@@ -43,7 +43,7 @@ class Preview:
 
 
 def log_preview(subject: Subject) -> Preview:
-    """What the figures of one log show."""
+    """Return the section of the figures of one log."""
     good, log = subject.good, subject.log
     t, lost = good.log.t, good.missing
     size = max(1, -(-good.log.n_samples // _BUCKETS))
@@ -131,7 +131,7 @@ def _any(mask: Mask, size: int) -> Array:
 
 
 def preview_figures(preview: Preview, uneven: bool) -> tuple[Figure, ...]:
-    """Position and torque over time; the sampling where it is `uneven`; what is left out."""
+    """Position and torque over time; the sampling where it is `uneven`; the samples that are excluded."""
     name, t = preview.name, preview.t
     figures = [
         joint_signal_figure(

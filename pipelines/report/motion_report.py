@@ -68,7 +68,7 @@ def _known(logs: Sequence[LogResult]) -> list[tuple[str, float, float | None]]:
 
 
 def _whiteness(logs: Sequence[LogResult], doubtful: Sequence[LogResult]) -> str:
-    """Whether the innovations support the standard deviations."""
+    """Return whether the innovations support the standard deviations."""
     if np.isnan(np.concatenate([log.speed_std for log in logs])).all():
         return ""  # nothing is stated that whiteness could support
     if doubtful:

@@ -103,7 +103,7 @@ def render_report(report: Report, footer: Mapping[str, str]) -> dict[str, bytes]
 
 
 def in_short(report: Report, checks: Sequence[Check] = ()) -> str:
-    """Return the verdict, what was found in the inputs, and the key figures as HTML."""
+    """Return the verdict, the checks of the inputs, and the key figures as HTML."""
     table = report.key_figures and _table_words(report.key_figures)
     said = [_prose(f"{check.code}: {check.message}") for check in checks if check.level != "ok"]
     verdict = _prose(report.verdict.replace("\n", " "))

@@ -1,7 +1,7 @@
-"""What a report consists of: words, tables and figures, drawn from a finished result.
+"""Define the parts of a report: words, tables and figures of a finished result.
 
 A stage's `report(result)` returns one `Report`; `pipelines.report.render` turns it into one HTML
-file and the figures beside it. Nothing here imports matplotlib: a figure carries the function that
+file and its figures. Nothing here imports matplotlib: a figure carries the function that
 will draw it. The cells of a table become text here, for a page and for a terminal alike.
 """
 
@@ -123,7 +123,7 @@ def column_texts(cells: Sequence[Cell], words: Callable[[str], str] = printable)
 
 
 def are_numbers(texts: Sequence[str]) -> bool:
-    """Whether all are numbers, with or without deviation, power of ten, percent sign."""
+    """Return whether all are numbers, with or without deviation, power of ten, percent sign."""
     return any(texts) and all(_NUMBER.fullmatch(text) for text in texts)
 
 

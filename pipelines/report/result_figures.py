@@ -117,7 +117,7 @@ def robot_of(result: Any) -> str:
 
 
 def name_in(robot: str) -> str:
-    """Return the name in a robot description, "" where it is none."""
+    """Return the name in a robot description, "" without one."""
     try:
         return str(parse_toml(robot).get("name", ""))
     except TomlError:
@@ -125,7 +125,7 @@ def name_in(robot: str) -> str:
 
 
 def _single(result: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Of a run its stages alone: what it repeats of them beside stands there as well."""
+    """Return the stages of a run alone: all else in its result repeats them."""
     return {"stages": result["stages"]} if "stages" in result else result
 
 

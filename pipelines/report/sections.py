@@ -42,7 +42,7 @@ def level_tone(levels: Iterable[Level]) -> Tone:
 
 
 def checks_table(checks: Iterable[Check], *, as_given: bool = False) -> Table:
-    """What was checked and found, the worst first, or `as_given`."""
+    """Return the table of checks, the worst first, or `as_given`."""
     found = list(checks) if as_given else sorted(checks, key=lambda c: _ORDER.index(c.level))
     return Table(
         ("result", "finding", "where", "what to do", "code"),
@@ -74,7 +74,7 @@ def further_logs(names: Iterable[str]) -> tuple[Section, ...]:
 
 
 def boundary_card(boundary: Boundary | None) -> tuple[Section, ...]:
-    """What the logged torque is: the verdict, a row a quantity, and what no log tells.
+    """Return the card of the logged torque: verdict, a row a quantity, and what is not identifiable.
 
     Nothing where no log moves the arm enough.
     """

@@ -27,13 +27,13 @@ _PARAGRAPH = "\x1e"  # the control character that separates records: no template
 
 
 def paragraphs(stage: str, macro: str, *values: Any, **named: Any) -> tuple[str, ...]:
-    """What a macro of the template of `stage` says, paragraph by paragraph."""
+    """Return the text of a macro of the template of `stage`, paragraph by paragraph."""
     said: str = getattr(template(f"{stage}.jinja").module, macro)(*values, **named)
     return tuple(part for part in map(_on_one_line, said.split(_PARAGRAPH)) if part)
 
 
 def sentence(stage: str, macro: str, *values: Any, **named: Any) -> str:
-    """What a macro of the template of `stage` says, in one paragraph."""
+    """Return the text of a macro of the template of `stage` as one paragraph."""
     return " ".join(paragraphs(stage, macro, *values, **named))
 
 
@@ -75,7 +75,7 @@ def _source(name: str) -> str:
 
 
 def _on_one_line(text: str) -> str:
-    """Line breaks are spaces, and there is none before a comma or behind an opening bracket."""
+    """Return text without line breaks, and without spaces before commas or inside brackets."""
     text = re.sub("[ \n]+", " ", text).strip(" ")
     return re.sub(r" (?=[,;:)]|[.](?:\s|$))|(?<=\() ", "", text)
 

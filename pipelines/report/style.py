@@ -1,4 +1,4 @@
-"""How figures and numbers look: colours every eye can tell apart, digits that mean something.
+"""Format figures and numbers: colours for colour-blind readers, significant digits.
 
 Colours: Okabe and Ito 2008, "Color Universal Design". Text in figures is drawn as outlines of the
 font that matplotlib ships, so a figure looks the same on every screen and printer and no name in it
@@ -42,11 +42,11 @@ COLOURS: Final = (
     ORANGE,
     SKY,
     PURPLE,
-)  # in the order they are told apart best
+)  # in the order of their contrast
 
 
 def printable(text: object, limit: int = 400) -> str:
-    """`text` as one line that any file, browser and font can take.
+    """Return `text` as a line that any file, browser and font can show.
 
     Names from a damaged file may hold halves of surrogate pairs, which UTF-8 cannot write.
     """
@@ -95,7 +95,7 @@ class Rounded(float):
     """A number for a cell, shown with so many significant digits.
 
     A column of equally many decimals fills it up with digits of its own, where a number that was
-    rounded before would get zeros that are none.
+    rounded before would get zeros that are not significant.
     """
 
     digits: int
@@ -200,7 +200,7 @@ def log_ticks(axis: Axis) -> None:
 
 @contextmanager
 def figure_style(salt: str) -> Iterator[None]:
-    """Draw in the report's style, whatever the user's own matplotlib settings say.
+    """Draw in the report's style, independent of the user's matplotlib settings.
 
     Args:
         salt: makes the identifiers in the SVG of one figure differ from those of the next, and

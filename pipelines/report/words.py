@@ -89,7 +89,7 @@ def _counted(number: int) -> str:
 
 
 def meaning_of(cause: str, parameter: str) -> str:
-    """What a parameter of an effect stands for, as the effect says; "" where it does not."""
+    """Return the meaning of a parameter of an effect; "" where it has none."""
     known = find_effect(cause).parameters if cause in effect_names() else ()
     own, which = part_of(cause, parameter)
     meaning = next((q.meaning for q in known if q.name == own), "")
@@ -170,7 +170,7 @@ def figure_in_words(name: str, within: bool = False) -> str:
 
 
 def _of_a_joint(found: Named) -> tuple[str, str]:
-    """What fit-friction calls by the law of the joint.
+    """Return a parameter that fit-friction names by the law of the joint, in words.
 
     It is a parameter of one of the effects that make the law up, "coulomb.level", of an effect that
     is the law, or of the joint itself, as its inertia is.
@@ -186,12 +186,12 @@ def _of_a_joint(found: Named) -> tuple[str, str]:
 
 
 def laws_words(laws_of: str, in_run: str = "", fewer: Sequence[FewerTerms] = ()) -> str:
-    """Which friction laws diagnose and extend fit; `in_run`: the option that a run has for it."""
+    """Return which friction laws diagnose and extend fit; `in_run`: the option of a run."""
     return sentence("diagnosis", "laws", laws_of, in_run, fewer_words(fewer))
 
 
 def fewer_words(fewer: Sequence[FewerTerms]) -> tuple[str, ...]:
-    """One sentence for all joints at which the same laws stand in place of the same one."""
+    """Return one sentence for all joints where the same laws replace the same law."""
     found = []
     for law, taken in dict.fromkeys((one.law, one.taken) for one in fewer):
         alike = [one for one in fewer if (one.law, one.taken) == (law, taken)]
@@ -227,7 +227,7 @@ class Units:
         return each(self.position, before="m")
 
     def at(self, joint: int | None) -> Units:
-        """Of one joint, from 1; of all where it is none."""
+        """Return the units of one joint, from 1; of all for None."""
         if joint is None or joint > len(self.turning):
             return self
         return Units(self.turning[joint - 1 : joint])
@@ -239,12 +239,12 @@ def each(units: str, behind: str = "", before: str = "") -> str:
 
 
 def joined(units: Iterable[str], otherwise: str = "") -> str:
-    """ "N m or N": each once, in their order; `otherwise` where there is none."""
+    """ "N m or N": each once, in their order; `otherwise` without any."""
     return " or ".join(dict.fromkeys(units)) or otherwise
 
 
 class Limited(Protocol):
-    """What says the unit of a quantity of a joint: a limit, or how near a motion comes to it."""
+    """An object with the unit of a quantity of a joint: a limit, or a distance to it."""
 
     @property
     def quantity(self) -> str: ...  # "position" | "speed" | "acceleration" | "torque" | of the tip
@@ -261,7 +261,7 @@ def unit_of(limits: Iterable[Limited], quantity: str) -> str:
 
 
 def units_in(found: Diagnosis | Extension) -> Units:
-    """By what a result says of its joints: curves over positions in metres are of slides."""
+    """Return the units of a result: curves over positions in metres are of sliding joints."""
     if isinstance(found, Extension):
         return Units(found.revolute)
     sliding = {

@@ -177,7 +177,7 @@ def _where_section(result: Result) -> Section:
 
 
 def _at_the_edge(log: TorqueValidation, t: float) -> str:
-    """Which end of the log `t` [s] is nearer to than one period of the low-pass; "" for none."""
+    """Return the end of the log that `t` [s] is within one low-pass period of; "" for neither."""
     if log.low_pass_hz is None or not log.stretches:
         return ""
     near = 1.0 / log.low_pass_hz
