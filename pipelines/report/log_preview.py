@@ -131,7 +131,7 @@ def _any(mask: Mask, size: int) -> Array:
 
 
 def preview_figures(preview: Preview, uneven: bool) -> tuple[Figure, ...]:
-    """Position and torque over time; the sampling where it is `uneven`; the samples that are excluded."""
+    """Draw position and torque over time; the sampling where it is `uneven`; excluded samples."""
     name, t = preview.name, preview.t
     figures = [
         joint_signal_figure(

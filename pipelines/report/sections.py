@@ -74,7 +74,7 @@ def further_logs(names: Iterable[str]) -> tuple[Section, ...]:
 
 
 def boundary_card(boundary: Boundary | None) -> tuple[Section, ...]:
-    """Return the card of the logged torque: verdict, a row a quantity, and what is not identifiable.
+    """Return the card of the logged torque: verdict, a row a quantity, what is not identifiable.
 
     Nothing where no log moves the arm enough.
     """
