@@ -1,10 +1,8 @@
-"""Frequency responses: averaged segments beside scipy and pyFRF, local polynomials beside Welch,
-modes of plants in a loop.
+"""Frequency responses: averaged segments beside scipy and pyFRF, modes of plants in a loop.
 
     python -m benchmarks.spectra [--samples 60000 600000] [--modes 24]
 
 Goals (performance.md): ≥ ×5 four scipy calls, ≥ ×1.5 pyFRF, linear in N; equal to scipy to 1e-12.
-At the peak of a light mode the local method has at most half the error of Welch's best segment.
 Modes: frequency within 1 %, damping within 15 %, inside the 95 % bands in 90 %.
 
 Ours gives all six spectra of v, r, q and from them both responses, their coherence and their
@@ -28,9 +26,8 @@ import numpy as np
 from scipy import signal
 
 from pipelines.frequency.controller import double_integrator
-from pipelines.frequency.local_polynomial import local_polynomial
-from pipelines.frequency.multisine import multisine_responses
 from pipelines.frequency.rational import Mode, fit_rational
+from pipelines.frequency.responses import averaged_responses
 from pipelines.frequency.spectra import closed_loop, cross_spectra
 from tests.frequency.loops import Plant, T, closed_loop_record, welch_responses
 
@@ -136,40 +133,6 @@ def growth(counts: tuple[int, ...] = (40_000, 200_000, 1_000_000)) -> str:
     )
 
 
-def light_mode(seeds: int = 10) -> str:
-    """Error within the half-power band of a mode of 1 % damping, 60 s, 2 % noise; for Welch the
-    best of five segments.
-    """
-    w = 2.0 * np.pi * 28.0
-    up, down, _ = signal.cont2discrete(([w * w], [1.0, 0.02 * w, w * w]), T)
-    shares, local, best = [], [], []
-    for seed in range(seeds):
-        rng = np.random.default_rng(seed)
-        u = rng.standard_normal(60_000)
-        y = signal.lfilter(up[0], down, u)
-        x = np.stack([u, y + 0.02 * y.std() * rng.standard_normal(len(y))], axis=1)
-
-        def error(frequency: np.ndarray, response: np.ndarray) -> float:
-            near = np.abs(frequency - 28.0) < 0.28
-            truth = signal.freqz(up[0], down, frequency[near], fs=RATE)[1]
-            return float(np.sqrt(np.mean(np.abs(response[near] / truth - 1.0) ** 2)))
-
-        ours = local_polynomial((x,), RATE, np.arange(27.0, 29.0, 0.05), 0, (1,)).of(0)
-        theirs = [
-            welch_responses((x,), RATE, size, 0, (1,)).of(0)
-            for size in (2048, 4096, 8192, 16384, 28672)
-        ]
-        local.append(error(ours.frequency, ours.response))
-        best.append(min(error(one.frequency, one.response) for one in theirs))
-        shares.append(local[-1] / best[-1])
-    return (
-        f"light mode, {seeds} seeds: error at the peak {100 * np.median(local):.1f} %, Welch's "
-        "best segment "
-        f"{100 * np.median(best):.1f} %; ratio median {np.median(shares):.2f}, largest "
-        f"{max(shares):.2f}"
-    )
-
-
 def _in_a_loop(plant: Plant, multisine: bool, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
     """Record the plant for 56 s in a loop with disturbances."""
     spectrum = np.zeros(2001, dtype=complex)
@@ -203,7 +166,7 @@ def _beside_the_truth(
 def modes(plants: int) -> str:
     """Fit base at 24-32 Hz and joint at 40-120 Hz in a loop with disturbances; four modes each."""
     found: dict[str, list[tuple[float, float, bool, bool]]] = {
-        "random, local polynomial": [],
+        "random": [],
         "multisine": [],
     }
     extra, seconds = 0, 0.0
@@ -219,10 +182,8 @@ def modes(plants: int) -> str:
             x, multisine = _in_a_loop(plant, way == "multisine", rng), way == "multisine"
             start = time.process_time()
             stretches = (x[:28_000], x[28_000:])
-            if multisine:
-                several = multisine_responses(stretches, RATE, 4000).noise
-            else:
-                several = local_polynomial(stretches, RATE, np.arange(2.0, 200.0, 0.25))
+            segment = (8000, 2) if multisine else (11_000, 1)
+            several = averaged_responses(stretches, RATE, *segment)
             p = closed_loop(several).within(2.0, 200.0)
             p = p.times(1.0 / double_integrator(p.frequency, T))
             fitted = fit_rational(
@@ -257,7 +218,6 @@ def main() -> None:
     for samples in given.samples:
         print("\n".join(compare(samples)), flush=True)
     print(growth(), flush=True)
-    print(light_mode(), flush=True)
     print(modes(given.modes))
 
 

@@ -21,11 +21,12 @@ import numpy as np
 from pipelines.dynamics.arm import Arm
 from pipelines.errors import Check, NothingMatched, UsageError
 from pipelines.frequency.config import GroupingConfig, ReportConfig
-from pipelines.frequency.findings import Findings, Seen, frf_findings
-from pipelines.frequency.grouping import Finding, Open, advance
+from pipelines.frequency.findings import Findings, frf_findings
+from pipelines.frequency.grouping import Finding, Open, delay_of
 from pipelines.frequency.modes import BAND
-from pipelines.frequency.responses import How, Measured
+from pipelines.frequency.responses import Measured
 from pipelines.frequency.result import COHERENCE, Method, Posture, methods_of, posture_of
+from pipelines.frequency.spectra import inside
 from pipelines.io.log import ExperimentLog, recording
 from pipelines.io.model_file import read_model
 from pipelines.io.option import option
@@ -50,10 +51,8 @@ _LOWEST = 0.1  # numerics: [Hz] slower than any arm
 
 @dataclass(frozen=True)
 class Settings:
-    """How responses are estimated, where modes are looked for, and what is drawn."""
+    """Where modes are looked for, and what is drawn."""
 
-    estimator: str = option("auto", "auto, multisine, local-polynomial or welch.")
-    resolution: float | None = option(None, "Of the spectra [Hz]. [0.25, or one over the period]")
     low: float = option(BAND[0], "Modes are looked for from here [Hz].")
     high: float = option(BAND[1], "To here [Hz]. [250, or 0.3 of the rate]")
     model: str | None = option(None, "model.json whose inertia is expected. [the controller's own]")
@@ -100,14 +99,16 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         words = f"modes from {settings.low:g} to {settings.high:g} Hz"
         remedy = "give two frequencies, the lower one first, from 0.1 Hz on"
         raise UsageError("C02", words, where="--low, --high", remedy=remedy)
-    _refuse_no_posture(settings, 0)
     logs, arm = _chosen(inputs), inputs.material
     if not isinstance(arm, Arm) or arm.n_joints != logs[0].n_joints:
         arm = None
-    said = tuple(check for log in logs for check in accepted(Subject(log)))
-    found = frf_findings(logs, arm, How(settings.estimator, settings.resolution), band)
+    checks = tuple(check for log in logs for check in accepted(Subject(log)))
+    found = frf_findings(logs, arm, band)
     counts = Counter(seen.measured.joint for seen in found.seen)
-    _refuse_no_posture(settings, max(counts.values(), default=0))
+    wrong = [k for k in settings.postures if not 1 <= k <= max(counts.values(), default=k)]
+    if wrong:
+        remedy = "give numbers as in the report under 'How it was measured', from 1 on"
+        raise UsageError("C02", f"no joint has a posture {wrong[0]}", "--posture", remedy=remedy)
     return Result(
         robot=logs[0].robot_name,
         responses=tuple(m for seen in found.seen for m in methods_of(seen)),
@@ -115,18 +116,8 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         classification=found.classification,
         undecided=found.undecided,
         drawn=settings.postures,
-        data_quality=(*said, *_complaints(found, settings)),
+        data_quality=(*checks, *_complaints(found)),
     )
-
-
-def _refuse_no_posture(settings: Settings, most: int) -> None:
-    """C02: a number of no posture, of the `most` of a joint; 0: not known yet."""
-    wrong = [number for number in settings.postures if number < 1 or 0 < most < number]
-    if wrong:
-        there = {0: "they are counted from 1", 1: "give 1"}.get(most, f"give 1 to {most}")
-        remedy = f"{there}, as numbered in the report under 'How it was measured'"
-        words = f"no joint has a posture {wrong[0]}"
-        raise UsageError("C02", words, where="--posture", remedy=remedy)
 
 
 def _chosen(inputs: Inputs) -> list[ExperimentLog]:
@@ -144,77 +135,44 @@ def _chosen(inputs: Inputs) -> list[ExperimentLog]:
     return now
 
 
-def _complaints(found: Findings, settings: Settings) -> list[Check]:
+def _complaints(found: Findings) -> list[Check]:
     """T09, T06, what has folded back; D13, coherence too low; D09, friction that turns its sign."""
-    said = [_unusable(one, settings) for one in found.unusable]
-    for joint in sorted({seen.measured.joint for seen in found.seen}):
-        said += _advancing([seen for seen in found.seen if seen.measured.joint == joint])
+    checks = []
+
+    def warn(code: str, words: str, measured: Measured, remedy: str, gate: bool = False) -> None:
+        where = ", ".join(t.name for t in measured.turned)
+        checks.append(Check.of(code, "warn", words, where=where, gate=gate, remedy=remedy))
+
+    for m in found.unusable:
+        if m.aliased:
+            words = f"torque of joint {m.joint} was sampled, and v has power up to half the rate: "
+            words += "what is faster has folded back (aliasing), and no mode can be identified"
+            warn("T09", words, m, _UNFOLDED, gate=True)
+        else:
+            words = f"v tells too little of joint {m.joint}: no mode is looked for"
+            remedy = "excite more strongly, record longer, or look for what disturbs the joint"
+            warn("D13", words, m, remedy, gate=True)
+    config = GroupingConfig()
     for seen in found.seen:
-        m = seen.measured
-        low = float(np.mean(m.plant.within(*seen.modes.band).coherence < COHERENCE))
+        m, first = seen.measured, seen.measured.first
+        late = delay_of([seen.modes], first.sample_time, first.held, config)
+        if late is not None and late.value < 0.0 and seen.modes.flat < config.flat:
+            words = f"joint {m.joint} moves {-1e3 * late.value:.3g} ms before its torque: torque "
+            words += "and position have different clocks, or what is faster has folded back "
+            warn("T06", f"{words}(aliasing)", m, _UNFOLDED, gate=True)
+        plant = m.plant.within(*seen.modes.band)
+        low = np.mean(plant.coherence[inside(m.excited, plant.frequency)] < COHERENCE)
         if low > 0.0:
-            words = (
-                f"the coherence of joint {m.joint} is under {COHERENCE:g} at {100.0 * low:.2g} % "
-                "of the frequencies of its excited band; they are shaded and hardly weigh"
-            )
-            remedy = "excite these frequencies more strongly, or record longer"
-            said.append(Check.of("D13", "warn", words, where=_logs_of(m), remedy=remedy))
-        said += _turning(m)
-    return said
-
-
-def _logs_of(measured: Measured) -> str:
-    return ", ".join(t.name for t in measured.turned)
-
-
-def _unusable(one: Measured, settings: Settings) -> Check:
-    if one.aliased:
-        code, remedy = "T09", _UNFOLDED
-        words = (
-            f"torque of joint {one.joint} was sampled, and v has power up to half the rate: what "
-            "is faster has folded back (aliasing), and no mode can be identified"
-        )
-    else:
-        code = "D13"
-        remedy = "excite more strongly, record longer, or look for what disturbs the joint"
-        words = (
-            f"v tells nothing of joint {one.joint} from {settings.low:g} to {settings.high:g} Hz: "
-            "no frequency can be relied on, no mode is looked for"
-        )
-    return Check.of(code, "warn", words, where=_logs_of(one), gate=True, remedy=remedy)
-
-
-def _advancing(own: list[Seen]) -> list[Check]:
-    """T06: position comes before torque."""
-    first = own[0].measured.first
-    early = advance([seen.modes for seen in own], first.sample_time, first.held)
-    if early is None or max(seen.modes.flat for seen in own) >= GroupingConfig().flat:
-        return []
-    words = (
-        f"joint {first.joint} moves {-1e3 * early.value:.3g} ms before its torque: torque and "
-        "position have different clocks, or what is faster has folded back (aliasing)"
-    )
-    where = ", ".join(_logs_of(seen.measured) for seen in own)
-    return [Check.of("T06", "warn", words, where=where, gate=True, remedy=_UNFOLDED)]
-
-
-def _turning(m: Measured) -> list[Check]:
-    speed, swing = m.first.speed, max(t.swing for t in m.turned)
-    if speed == 0.0:
-        words = (
-            f"joint {m.joint} did not turn: friction sticks, and looks like a spring in the "
-            "response"
-        )
-        remedy = "let it turn slowly while it is excited"
-    elif swing > ReportConfig().swing * speed:
-        words = (
-            f"the excitation swings the speed of joint {m.joint} by {swing:.2g} about {speed:.2g} "
-            "rad/s: friction now and then turns its sign, which adds damping"
-        )
-        remedy = "turn faster, or excite more weakly"
-    else:
-        return []
-    return [Check.of("D09", "warn", words, where=_logs_of(m), remedy=remedy)]
+            words = f"the coherence of joint {m.joint} is under {COHERENCE:g} at {100.0 * low:.2g} "
+            words += "% of the frequencies of its excited band; they are shaded and hardly weigh"
+            warn("D13", words, m, "excite these frequencies more strongly, or record longer")
+        swing = max(t.swing for t in m.turned)
+        if swing > ReportConfig().swing * first.speed:
+            words = f"the excitation swings the speed of joint {m.joint} by {swing:.2g} about "
+            words += f"{first.speed:.2g} rad/s: friction turns its sign, which adds damping; or it "
+            words += "sticks, which looks like a spring"
+            warn("D09", words, m, "let the joint turn slowly and faster, or excite more weakly")
+    return checks
 
 
 def report(result: Result) -> Report:

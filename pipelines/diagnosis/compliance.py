@@ -19,7 +19,6 @@ from pipelines.effects import all_effects, find_effect
 from pipelines.errors import InputRejected
 from pipelines.frequency.findings import Seen, frf_findings
 from pipelines.frequency.grouping import Finding
-from pipelines.frequency.modes import relative_acceleration
 from pipelines.io.log import ExperimentLog
 
 __all__ = ["Compliance", "compliance", "new_causes", "untold"]
@@ -114,7 +113,7 @@ def _acting(one: Finding, arm: Arm) -> Acting:
 
 def _answer(one: Seen) -> Answer:
     first = one.measured.first
-    shown = relative_acceleration(one.measured).within(*one.modes.band)
+    shown = one.modes.relative.within(*one.modes.band)
     unit = "1" if first.quantity == "r" else "1/(kg m^2)" if first.revolute else "1/kg"
     fitted, at = np.abs(one.modes.fit.response(shown.frequency)), np.asarray(first.posture, float)
     seen = (shown.frequency, np.abs(shown.response), shown.coherence)

@@ -1,15 +1,8 @@
 """Name compliance in all joints and postures: base, joint, delay or none, with evidence.
 
-    found = frf_findings(logs, arm)
-    found.classification       what is sure
-    found.undecided            what is there and could be more than one thing, and what to record
-
-Kostić et al. 2004, Section IV.D: the base shows at the same frequency in every posture, with a
-temporary phase lead; what bends in the arm moves with the posture. A pair of antiresonance and
-resonance is explained by masses and springs of either kind with the inertia measured in each
-posture; the one is chosen that explains all postures far better. Where the postures do not tell,
-only what drops out does: a base does not weigh less than the arm it carries. Wrongly naming one for
-the other is worse than saying that it is open.
+found = frf_findings(logs, arm)
+found.classification       what is sure
+found.undecided            what is there and could be more than one thing, and what to record
 """
 
 from __future__ import annotations
@@ -23,9 +16,10 @@ from pipelines.dynamics.arm import Arm
 from pipelines.errors import InputRejected, RrridError
 from pipelines.frequency.config import GroupingConfig, ReportConfig, SignConfig
 from pipelines.frequency.grouping import Finding, Open, group_joint, seen_elsewhere
-from pipelines.frequency.modes import BAND, Modes, fitted_modes, relative_acceleration, tells
-from pipelines.frequency.responses import How, Measured, measured_responses
+from pipelines.frequency.modes import BAND, Modes, fitted_modes, informative, relative_acceleration
+from pipelines.frequency.responses import Measured, measured_responses
 from pipelines.frequency.signals import Turned
+from pipelines.frequency.spectra import inside
 from pipelines.io.log import ExperimentLog
 from pipelines.io.model_file import parse_model
 
@@ -65,40 +59,34 @@ class Findings:
     """Of all "frf" logs of an arm."""
 
     seen: tuple[Seen, ...]
-    unusable: tuple[Measured, ...]  # in whose band the excitation tells nothing: nothing is named
+    unusable: tuple[Measured, ...]  # in whose band v excites too little: nothing is named
     classification: tuple[Finding, ...]
     undecided: tuple[Open, ...]
 
 
 def frf_findings(
-    logs: Iterable[ExperimentLog],
-    arm: Arm | None = None,
-    how: How | None = None,
-    band: tuple[float, float] = BAND,
+    logs: Iterable[ExperimentLog], arm: Arm | None = None, band: tuple[float, float] = BAND
 ) -> Findings:
     """Return responses, modes and grouping of "frf" logs.
 
     Args:
         logs: of experiment "frf", of one robot.
         arm: its model, for the inertia to expect; None: the controller's own, where logs carry it.
-        how: spectra are taken.
         band: [Hz] in which modes are looked for.
 
     Raises:
         InputRejected: a log that no spectrum can be taken of, with what to record: S01, T05, T08,
             D04, D09; S14, a joint that accelerates against its input.
     """
-    measured = measured_responses(logs, how)
-    for one in measured:
-        _check_sign(one)
-    told = [tells(one, band) for one in measured]
-    seen = tuple(
-        Seen(one, fitted_modes(one, band), _expected(one.first, arm))
-        for one, does in zip(measured, told, strict=True)
-        if does
-    )
-    unusable = tuple(one for one, does in zip(measured, told, strict=True) if not does)
-    return Findings(seen, unusable, *grouped(seen))
+    seen, unusable = [], []
+    for measured in measured_responses(logs):
+        _check_sign(measured)
+        if informative(measured, band):
+            modes = fitted_modes(measured, band)
+            seen.append(Seen(measured, modes, _expected(measured.first, arm)))
+        else:
+            unusable.append(measured)
+    return Findings(tuple(seen), tuple(unusable), *grouped(seen))
 
 
 def grouped(
@@ -109,10 +97,9 @@ def grouped(
     unsure: list[Open] = []
     for joint in sorted({one.measured.joint for one in seen}):
         own = [one for one in seen if one.measured.joint == joint]
-        modes, loads = [one.modes for one in own], [one.measured.load for one in own]
-        turned = own[0].measured.first
-        kind = (turned.sample_time, turned.revolute, turned.held)
-        found, left = group_joint(joint, modes, *kind, loads, config)
+        first, load = own[0].measured.first, min(one.measured.load for one in own)
+        modes = [one.modes for one in own]
+        found, left = group_joint(joint, modes, first.sample_time, load, first.held, config)
         sure += found
         unsure += left
     return seen_elsewhere(sure, unsure, config)
@@ -121,7 +108,7 @@ def grouped(
 def _check_sign(measured: Measured) -> None:
     whole = relative_acceleration(measured)
     reliable = whole.coherence >= ReportConfig().coherence
-    whole = whole.where(measured.excited.holds(whole.frequency) & reliable)
+    whole = whole.where(inside(measured.excited, whole.frequency) & reliable)
     slow = whole.within(0.0, _CONFIG.slow)
     slow = slow.within(0.0, _CONFIG.first * float(slow.frequency.min(initial=_CONFIG.slow)))
     if len(slow.frequency) < _CONFIG.fewest:
@@ -136,7 +123,12 @@ def _check_sign(measured: Measured) -> None:
 
 def _expected(turned: Turned, arm: Arm | None) -> Expected:
     """Return the level of acceleration to expect, and the inertia behind it."""
-    given, theirs = _inertia(arm, turned), _inertia(_controllers(turned), turned)
+    text = turned.controller.model if turned.controller is not None else None
+    try:
+        controllers = None if text is None else Arm.from_model(parse_model(text))
+    except RrridError:
+        controllers = None  # a model that cannot be read is one that is not there
+    given, theirs = _inertia(arm, turned), _inertia(controllers, turned)
     inertia, source = given, "given model"
     if given is None:
         inertia, source = theirs, "none" if theirs is None else "controller's model"
@@ -144,14 +136,6 @@ def _expected(turned: Turned, arm: Arm | None) -> Expected:
         return Expected(None if inertia is None else 1.0 / inertia, inertia, source)
     level = 1.0 if inertia is None or theirs is None else theirs / inertia
     return Expected(level, inertia, source)
-
-
-def _controllers(turned: Turned) -> Arm | None:
-    text = turned.controller.model if turned.controller is not None else None
-    try:
-        return None if text is None else Arm.from_model(parse_model(text))
-    except RrridError:
-        return None  # a model that cannot be read is one that is not there
 
 
 def _inertia(arm: Arm | None, turned: Turned) -> float | None:

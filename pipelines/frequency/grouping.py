@@ -1,6 +1,24 @@
-"""Group the modes of one joint across its postures: base, joint, delay, rigid, or open.
+"""Name what the responses of a joint show in its postures: base, joint, delay, rigid, or open.
 
-Every answer has its evidence in words and numbers.
+Every answer has its evidence in words and numbers. A base shows at the same frequency in every
+posture, with a phase lead; what bends in the arm moves with the posture (Kostić et al. 2004,
+Section IV.D). A pair of modes is explained by masses and springs of either kind with the inertia
+measured in each posture:
+
+    T = ½ I ẋ² + ½ J_m (ẋ + q̇)² + ½ (J - J_m)(ẋ + q̇ + ẇ)²,    V = ½ I ω_b² x² + ½ k w²
+
+x turns the base, q is what encoder and torque act on, w the twist of the joint; J is the joint's
+inertia in a posture, the other joints held. Resonances are the modes under no torque,
+antiresonances those with q locked (Spong 1987, ASME J. Dyn. Syst. 109, p. 310, for the joint).
+
+    base alone       f_r = f_b in every posture,   f_a = f_b √(I / (I + J))
+                     A rotor behind a gear turns N times as fast as the joint, and hardly feels the
+                     base: of J = J_l + J_m the base carries J_l,  K = I ω_b²,
+                     ω_a² = K / (I + J_l),  ω_r² = K / (I + J_l J_m / J); J_m = 0 if it rides along
+    joint alone      f_a = √(k / (J - J_m)) / 2π moves with the posture,   f_r / f_a = √(J / J_m)
+
+The one is chosen that explains all postures far better. Wrongly naming one for the other is worse
+than saying that it is open.
 """
 
 from __future__ import annotations
@@ -10,15 +28,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from pipelines.estimation.bounded import Minimum, least_squares
 from pipelines.frequency.config import GroupingConfig
 from pipelines.frequency.modes import Modes, Pair
 from pipelines.frequency.rational import Known
-from pipelines.frequency.springs import Explained, explain
-from pipelines.io.results import NOT_STORED
+from pipelines.frequency.spectra import Array
 
-__all__ = ["Finding", "Open", "advance", "group_joint", "seen_elsewhere"]
+__all__ = ["Explained", "Finding", "Open", "explain", "group_joint", "predicted", "seen_elsewhere"]
 
-_BASE, _JOINT = "base_resonance", "joint_elasticity"
+_BASE, _JOINT, _GAP = "base_resonance", "joint_elasticity", "backlash"
+Spring = tuple[float, float]  # f_b [Hz], I [kg m^2] of a base; k [N m/rad], J_m [kg m^2] of a joint
 
 
 @dataclass(frozen=True)
@@ -33,10 +52,6 @@ class Finding:
     damping: Known | None = None  # ratio, of the same
     parameters: Mapping[str, Known] = field(default_factory=dict)  # SI
     seen_at: tuple[int, ...] = ()  # joints
-    # its pairs are so small that they may be a trace of what another joint does
-    faint: bool = field(default=False, metadata=NOT_STORED)
-    # [Hz] of a base: the antiresonance in each posture
-    stands: tuple[Known, ...] = field(default=(), metadata=NOT_STORED)
     frequencies: tuple[Known, ...] = ()  # [Hz] `frequency` in each posture
 
 
@@ -51,313 +66,215 @@ class Open:
     experiment: str  # what to record to tell
 
 
-Grouped = tuple[list[Finding], list[Open]]
-
-
 @dataclass(frozen=True)
-class _Joint:
-    """One joint in all its postures."""
+class Explained:
+    """A set of springs fitted to the pairs of all postures."""
 
-    number: int
-    modes: Sequence[Modes]
-    sample_time: float
-    unit: str  # of the inertia
-    held: bool
+    base: Spring | None
+    joint: Spring | None
+    std: Array  # relative, of the numbers above in their order
+    misfit: float  # χ², with the share that frequencies are granted
+    worst: float  # largest relative deviation of a frequency
+    freedom: int  # numbers measured less numbers fitted
     config: GroupingConfig
 
-    def open(self, frequency: Known | None, candidates: Sequence[str], why: str, ask: str) -> Open:
-        """Return a question about this joint."""
-        return Open(self.number, frequency, tuple(candidates), why, ask)
-
     @property
-    def inertia(self) -> list[float]:
-        """Of each posture [kg m^2]."""
-        return [m.inertia.value if m.inertia else np.nan for m in self.modes]
-
-    @property
-    def postures(self) -> str:
-        """How many there are, in words."""
-        return "one posture" if len(self.modes) == 1 else f"{len(self.modes)} postures"
-
-    @property
-    def band(self) -> tuple[float, float]:
-        """[Hz] that all postures tell."""
-        return max(m.band[0] for m in self.modes), min(m.band[1] for m in self.modes)
-
-    @property
-    def flat(self) -> float:
-        """Ratio by which the magnitude changes beside the modes, at most."""
-        return max(m.flat for m in self.modes)
-
-
-def advance(
-    modes: Sequence[Modes],
-    sample_time: float,
-    held: bool = True,
-    config: GroupingConfig | None = None,
-) -> Known | None:
-    """Return the delay [s], where it is negative beyond doubt: position leads its torque."""
-    mean = _late(modes, sample_time, held, config or GroupingConfig())
-    return mean if mean is not None and mean.value < 0.0 else None
+    def accepted(self) -> bool:
+        """Return whether they explain what was measured."""
+        return self.misfit <= self.config.tells + self.config.fits * self.freedom
 
 
 def group_joint(
     joint: int,
     modes: Sequence[Modes],
     sample_time: float,
-    revolute: bool = True,
+    load: float = 0.0,
     held: bool = True,
-    loads: Sequence[float] = (),
     config: GroupingConfig | None = None,
-) -> Grouped:
+) -> tuple[list[Finding], list[Open]]:
     """Return what the responses of one joint (1-based), one a posture, say together.
 
     Args:
         joint: 1-based.
         modes: of each posture.
         sample_time: [s].
-        revolute: whether it turns.
+        load: least mean torque less friction over its deviation.
         held: whether its input is held over a sample; else the instant is unknown.
-        loads: mean torque less friction over its deviation, of each posture.
         config: what decides.
+    """
+    config = config or GroupingConfig()
+    band = f"from {max(m.band[0] for m in modes):.3g} to {min(m.band[1] for m in modes):.3g} Hz"
+    narrow = min(m.band[1] for m in modes) < config.span * max(m.band[0] for m in modes)
+    flat, count = max(m.flat for m in modes), min(len(m.pairs) for m in modes)
+    changes = f"the magnitude changes {flat:.3g}-fold"
+
+    def ask(
+        why: str, record: str, *candidates: str, frequency: Known | None = None
+    ) -> tuple[list[Finding], list[Open]]:
+        return [], [Open(joint, frequency, candidates, why, record)]
+
+    if max((m.misfit for m in modes if m.scatter > config.left), default=0.0) > config.misfit:
+        why = "No linear plant explains the response, as of a gap that is crossed."
+        record = "another strength of excitation and a faster turn"
+        return ask(why, record, _GAP, _JOINT, _BASE)
+    if not count and max(m.hidden for m in modes) > 0.5 * (config.flat - 1.0):
+        why = f"No mode {band}, but the response scatters, as by noise or a gap that is crossed."
+        return ask(why, "longer, and excited more strongly", _GAP, _JOINT, _BASE)
+    late = delay_of(modes, sample_time, held, config)
+    if late is not None and late.value < 0.0:
+        why = f"Position leads torque by {-1e3 * late.value:.3g} ms, as by two clocks, or faster "
+        why += f"motion that has folded back (aliasing); {changes}."
+        record = "all signals by one clock, at the controller's own rate"
+        return ask(why, record, *((_JOINT, _BASE, _GAP) if flat >= config.flat else ()))
+    found: list[Finding] = []
+    left: list[Open] = []
+    if late is not None and flat < config.flat:
+        why = f"The phase falls in proportion to the frequency, {changes}: position comes "
+        why += f"{1e3 * late.value:.3g} ± {2e3 * late.std:.2g} ms late, beyond hold and controller."
+        about = {"delay": late}
+        found.append(Finding("delay", joint, why, "time_delay", parameters=about, seen_at=(joint,)))
+    elif late is not None:
+        why = f"The phase falls as with {1e3 * late.value:.3g} ms of delay, but {changes}."
+        record = "the measured motor current beside the command"
+        left += ask(why, record, "drive_lag", "time_delay", "torque_lag")[1]
+    strongest = [sorted(m.pairs, key=lambda p: -p.rise) for m in modes]
+    extra = [p.resonance.frequency for own in strongest for p in own[count:]]
+    extra += [mode.frequency for m in modes for mode in m.single]
+    if extra:
+        why = f"A mode at {_many(extra)} Hz has no partner, or shows in some postures only."
+        record = "longer, to higher frequencies, and in a second posture"
+        left += ask(why, record, _BASE, _JOINT, _GAP, "drive_lag", frequency=extra[0])[1]
+    if count:
+        springs = _springs(joint, modes, [own[:count] for own in strongest], load, config)
+        return found + springs[0], springs[1] + left
+    if found or left:
+        return found, left
+    if narrow or flat >= config.flat:
+        why = f"No mode is distinct {band}; {changes}."
+        record = "longer, more strongly, to lower and higher frequencies"
+        return ask(why, record, _JOINT, _BASE, _GAP, "drive_lag")
+    why = f"No mode {band} in {len(modes)} posture(s): the acceleration per input is flat within "
+    why += f"{100.0 * (flat - 1.0):.2g} %, without delay."
+    return [Finding("rigid", joint, why, seen_at=(joint,))], []
+
+
+def delay_of(
+    modes: Sequence[Modes], sample_time: float, held: bool, config: GroupingConfig
+) -> Known | None:
+    """Return the delay [s], where there is one beyond doubt, of either sign."""
+    mean = _mean([m.delay for m in modes])
+    least = max((config.delay if held else 1.0) * sample_time, config.sure * mean.std)
+    return mean if np.isfinite(mean.value) and abs(mean.value) >= least else None
+
+
+def _springs(
+    joint: int,
+    modes: Sequence[Modes],
+    strongest: list[list[Pair]],
+    load: float,
+    config: GroupingConfig,
+) -> tuple[list[Finding], list[Open]]:
+    """Explain as many pairs in each posture by a base, by a spring in the joint, or by both.
 
     A gap answers as a spring does as long as it stays closed, and on average where it is crossed
     (its describing function: Gelb, Vander Velde 1968, ch. 2): no open question leaves it out, and
     no spring under a steady load that is damped as teeth are.
     """
-    config = config or GroupingConfig()
-    unit = "kg m²" if revolute else "kg"
-    found, left = _grouped(_Joint(joint, modes, sample_time, unit, held, config))
-    left = [
-        replace(one, candidates=(*one.candidates, "backlash"))
-        if _JOINT in one.candidates and "backlash" not in one.candidates
-        else one
-        for one in left
+    pairs = [sorted(own, key=lambda p: p.antiresonance.frequency.value) for own in strongest]
+    known = [m.inertia for m in modes if m.inertia is not None and m.inertia.value > 0.0]
+    inertia = [j.value for j in known]
+    seen = (
+        f"Antiresonance at {_many([p.antiresonance.frequency for own in pairs for p in own])} Hz, "
+        f"resonance at {_many([p.resonance.frequency for own in pairs for p in own])} Hz, with "
+        f"{', '.join(f'{j:.3g}' for j in inertia) or 'unknown'} kg m² at the joint"
+    )
+
+    def open_by(why: str) -> tuple[list[Finding], list[Open]]:
+        record = f"joint {joint} in a further posture of the other joints that changes its inertia "
+        record += "by a tenth or more"
+        lowest = min((p.resonance.frequency for own in pairs for p in own), key=lambda f: f.value)
+        return [], [Open(joint, lowest, (_BASE, _JOINT, _GAP), f"{seen}; {why}.", record)]
+
+    single = len(pairs[0]) == 1
+    tried: list[Explained] = []
+    if len(known) == len(modes):
+        spread = [j.std / j.value for j in known]
+        kinds = ((True, False), (False, True)) if single else ((True, True),)
+        every = (explain(pairs, inertia, kind, spread, config) for kind in kinds)
+        tried = [one for one in every if one is not None and one.accepted]
+    if not tried:
+        return open_by("no base and no spring in the joint explains it")
+    best = min(tried, key=lambda one: one.misfit)
+    moves = max(inertia) > config.moves * min(inertia)
+    if single and min(own[0].rise for own in pairs) > config.heavy:
+        tried = [one for one in tried if one.joint is not None]  # no base is lighter than its arm
+        best = tried[0] if tried else best
+    elif any(one.misfit < best.misfit + config.tells for one in tried if one is not best) or (
+        not single and not (moves and len(modes) > 1)
+    ):
+        return open_by("one posture, or equal inertia, does not tell a base from a joint")
+    kinds_of = [
+        name for name, one in (("a base", best.base), ("a spring in the joint", best.joint)) if one
     ]
-    if not loads or min(abs(load) for load in loads) < config.closed:
-        return found, left
-    sure = []
-    for one in found:
-        d = one.damping
-        if one.kind != "joint" or d is None or d.value + 2.0 * d.std <= config.contact:
-            sure.append(one)
-            continue
-        words = (
-            f"{one.evidence} But the load on the joint never changes its sign, and a damping ratio "
-            f"of {d.value:.2g} is that of teeth in contact as well: a gap would stay closed."
-        )
-        ask = (
-            f"joint {joint} in a posture without load by gravity, or excited until its torque "
-            "changes sign"
-        )
-        left.append(Open(joint, one.frequency, (_JOINT, "backlash"), words, ask))
-    return sure, left
-
-
-def _grouped(own: _Joint) -> Grouped:
-    modes, config = own.modes, own.config
-    worst = max((m.misfit for m in modes if m.left > config.left), default=0.0)
-    if worst > config.misfit:
-        words = (
-            f"No linear plant explains the response: what it leaves has {worst:.3g} times the "
-            "variance of noise. A gap that is crossed, or friction that turns its sign, does so."
-        )
-        ask = "another strength of excitation and a faster turn; else longer"
-        return [], [own.open(None, ("backlash", _JOINT, _BASE), words, ask)]
-    most = max(len(m.pairs) for m in modes)
-    count = min(len(_strongest(m, most)) for m in modes)
-    left, (low, high) = max(m.left for m in modes), own.band
-    if not count and 2.0 * left > config.flat - 1.0:
-        words = (
-            f"No mode is distinct from {low:.3g} to {high:.3g} Hz, but the response scatters by "
-            f"{100.0 * left:.2g} % about a linear plant's: whether it is flat within "
-            f"{100.0 * (config.flat - 1.0):.2g} %, or late, is not known. Noise does so, and a gap "
-            "that is crossed."
-        )
-        ask = "longer, and excited more strongly"
-        return [], [own.open(None, ("backlash", _JOINT, _BASE), words, ask)]
-    late = _late(modes, own.sample_time, own.held, config)
-    if late is not None and late.value < 0.0:
-        return [], [_early(own, late)]
-    delays, unclear = ([], []) if late is None else _delay(own, late)
-    unclear += _leftover(own, count)
-    pairs = [_strongest(m, count) for m in modes]
-    found, more = _springs(own, pairs) if count else ([], [])
-    if not (found or more or delays or unclear):
-        found, more = _rigid(own)
-    return [*found, *delays], [*more, *unclear]
-
-
-def _strongest(modes: Modes, count: int) -> list[Pair]:
-    """As many pairs: those that nearly cancel too, where distinct ones are fewer than elsewhere."""
-    several = (*modes.pairs, *modes.faint) if len(modes.pairs) < count else modes.pairs
-    kept = sorted(several, key=lambda p: -p.rise)[:count]
-    return sorted(kept, key=lambda p: p.antiresonance.frequency.value)
-
-
-def _leftover(own: _Joint, count: int) -> list[Open]:
-    """Modes that only some postures show, or that have no partner."""
+    words = f"{seen}: {' and '.join(kinds_of)} within {100.0 * best.worst:.2g} %."
     found = []
-    by_rise = [sorted(m.pairs, key=lambda p: -p.rise)[count:] for m in own.modes]
-    if extra := [p.resonance.frequency for rest in by_rise for p in rest]:
-        words = f"A pair at {_many(extra)} Hz is seen in some postures of joint {own.number} only."
-        ask = "the same posture again, longer or excited more strongly"
-        found.append(own.open(extra[0], (_BASE, _JOINT, "backlash"), words, ask))
-    if alone := [m.frequency for one in own.modes for m in one.single]:
-        words = (
-            f"A mode at {_many(alone)} Hz has no partner: antiresonance without resonance above "
-            "it, or the reverse."
-        )
-        ask = "excitation to higher frequencies, and a second posture"
-        found.append(own.open(alone[0], (_JOINT, _BASE, "drive_lag"), words, ask))
-    return found
+    if best.base is not None:
+        found.append(_as_base(joint, best, best.base, pairs, words))
+    if best.joint is not None:
+        spring = _as_joint(joint, best, best.joint, pairs, inertia, words)
+        d = spring.damping
+        if d is not None and load > config.closed and d.value + 2.0 * d.std > config.contact:
+            words += " But the load on the joint never changes its sign, and teeth in contact are "
+            words += f"damped by {d.value:.2g} as well: a gap would stay closed."
+            record = f"joint {joint} in a posture without load by gravity"
+            return found, [Open(joint, spring.frequency, (_JOINT, _GAP), words, record)]
+        found.append(spring)
+    return found, []
 
 
-def _springs(own: _Joint, pairs: list[list[Pair]]) -> Grouped:
-    config = own.config
-    if not np.isfinite(own.inertia).all() or min(own.inertia) <= 0.0:
-        return [], [_which(own, pairs, "the inertia of the joint could not be measured")]
-    if len(pairs[0]) == 1:
-        return _one_spring(own, pairs)
-    base_and_joint = 2
-    if len(pairs[0]) == base_and_joint:
-        both = _explained(own, pairs, (True, True))
-        if both is not None and len(pairs) > 1 and _accepted(both, config) and _moves(own):
-            words = (
-                f"{_told(own, pairs)}. A base and a spring in the joint together explain both "
-                f"pairs in all {len(pairs)} postures, within {100.0 * both.worst:.2g} %."
-            )
-            return [_as_base(own, both, pairs, words), _as_joint(own, both, pairs, words)], []
-        strong = [sorted(one, key=lambda p: -p.rise) for one in pairs]
-        if all(a.rise > config.heavy and b.rise < config.trace for a, b in strong):
-            found, left = _one_spring(own, [one[:1] for one in strong])
-            weak = [one[1:] for one in strong]
-            return found, [*left, _which(own, weak, "a small pair beside a large one")]
-    words = f"{len(pairs[0])} pairs that no base and joint spring explain together"
-    return [], [_which(own, pairs, words)]
-
-
-def _one_spring(own: _Joint, pairs: list[list[Pair]]) -> Grouped:
-    config, told = own.config, _told(own, pairs)
-    base = _explained(own, pairs, (True, False))
-    spring = _explained(own, pairs, (False, True))
-    if base is None or spring is None or base.base is None or spring.joint is None:
-        raise AssertionError("one pair a posture is one spring's")
-    rise = float(np.mean([one[0].rise for one in pairs]))
-    higher = f"the level above the resonance is {rise:.3g} times that below"
-    if spring.misfit > base.misfit + config.tells and _accepted(base, config):
-        words = (
-            f"{told}. The resonance stays where it is while the inertia changes, with a phase lead "
-            f"between the two: a base of {base.base[1]:.3g} {own.unit} explains every frequency "
-            f"within {100.0 * base.worst:.2g} %, a spring in the joint {_within(spring)}."
-        )
-        return [_as_base(own, base, pairs, words)], []
-    if base.misfit > spring.misfit + config.tells and _accepted(spring, config):
-        words = (
-            f"{told}. The antiresonance moves with the posture as a link on a spring does. "
-            f"T{higher[1:]}: 1/J of a motor of {spring.joint[1]:.3g} {own.unit}. A spring in the "
-            f"joint explains every frequency within {100.0 * spring.worst:.2g} %, a base "
-            f"{_within(base)}."
-        )
-        return [_as_joint(own, spring, pairs, words)], []
-    if _accepted(spring, config) and all(one[0].rise > config.heavy for one in pairs):
-        words = (
-            f"{told}. The postures do not tell base and joint apart, but {higher}: what drops out "
-            f"there outweighs the rest, {spring.joint[1]:.3g} {own.unit}. That is a link behind a "
-            "spring, not a base lighter than its arm."
-        )
-        return [_as_joint(own, spring, pairs, words)], []
-    why = f"a base explains it {_within(base)}, a spring in the joint {_within(spring)}"
-    if len(pairs) == 1:
-        why = "one posture only"
-    elif not _moves(own):
-        why = "the inertia hardly differs between the postures"
-    return [], [_which(own, pairs, f"{told}; {why}")]
-
-
-def _explained(
-    own: _Joint, pairs: list[list[Pair]], springs: tuple[bool, bool]
-) -> Explained | None:
-    slack = max(m.slack for m in own.modes)
-    share = [m.inertia.std / m.inertia.value if m.inertia else 0.0 for m in own.modes]
-    return explain(pairs, own.inertia, springs, slack, share, own.config.light)
-
-
-def _within(one: Explained) -> str:
-    return f"within {100.0 * one.worst:.2g} %" if one.worst < 1.0 else "not at all"
-
-
-def _accepted(one: Explained, config: GroupingConfig) -> bool:
-    return one.misfit <= config.tells + config.fits * one.freedom
-
-
-def _moves(own: _Joint) -> bool:
-    """Return whether postures differ enough in inertia to tell by."""
-    return max(own.inertia) > own.config.moves * min(own.inertia)
-
-
-def _as_base(own: _Joint, one: Explained, pairs: list[list[Pair]], words: str) -> Finding:
-    frequency, inertia = one.base or (np.nan, np.nan)
-
-    def off(pair: Pair) -> float:
-        return abs(pair.resonance.frequency.value - frequency)
-
-    near = [min(several, key=off) for several in pairs]
+def _as_base(
+    joint: int, one: Explained, base: Spring, pairs: list[list[Pair]], words: str
+) -> Finding:
+    near = [min(own, key=lambda p: abs(p.resonance.frequency.value - base[0])) for own in pairs]
     each = tuple(p.resonance.frequency for p in near)
-    measured, damping = _mean(each), _mean([p.resonance.damping for p in near])
-    known = Known(inertia, inertia * one.std[1])
-    return Finding(
-        kind="base",
-        joint=None,
-        evidence=words,
-        cause=_BASE,
-        frequency=measured,
-        damping=damping,
-        parameters={"frequency": measured, "damping_ratio": damping, "inertia": known},
-        seen_at=(own.number,),
-        faint=max(p.rise for p in near) < own.config.trace,
-        stands=tuple(p.antiresonance.frequency for p in near),
-        frequencies=each,
-    )
+    frequency, damping = _mean(each), _mean([p.resonance.damping for p in near])
+    inertia = Known(base[1], base[1] * float(one.std[1]))
+    about = {"frequency": frequency, "damping_ratio": damping, "inertia": inertia}
+    return Finding("base", None, words, _BASE, frequency, damping, about, (joint,), each)
 
 
-def _as_joint(own: _Joint, one: Explained, pairs: list[list[Pair]], words: str) -> Finding:
-    k, motor = one.joint or (np.nan, np.nan)
-    link = np.array(own.inertia) - motor
-    locked = np.sqrt(k / link) / (2.0 * np.pi)
-    near = []
-    for several, f in zip(pairs, locked.tolist(), strict=True):
-        off = [abs(p.antiresonance.frequency.value - f) for p in several]
-        near.append(several[off.index(min(off))])
-    damping = _mean([p.antiresonance.damping for p in near])
-    each = tuple(p.antiresonance.frequency for p in near)
-    # d = 2 ζ √(k (J - J_m)): what is known of k and J_m is in d as well.
-    ratios, mean_link = [p.antiresonance.damping.value for p in near], float(np.mean(link))
-    d = float(np.mean(2.0 * np.array(ratios) * np.sqrt(k * link)))
-    slope = d * np.array([1.0 / max(abs(damping.value), 1e-9), 0.5, -0.5 * motor / mean_link])
-    known = np.zeros((3, 3))
-    known[0, 0], known[1:, 1:] = damping.std**2, one.covariance[-2:, -2:]  # ζ, log k, log J_m
-    frequency = float(np.sqrt(k / mean_link) / (2.0 * np.pi))
+def _as_joint(
+    joint: int,
+    one: Explained,
+    spring: Spring,
+    pairs: list[list[Pair]],
+    inertia: Sequence[float],
+    words: str,
+) -> Finding:
+    k, motor = spring
+    k_std, motor_std = one.std[-2:].tolist()
+    link = np.array(inertia) - motor
+    locked = (np.sqrt(k / link) / (2.0 * np.pi)).tolist()
+    near = [
+        min(own, key=lambda p: abs(p.antiresonance.frequency.value - f)).antiresonance
+        for own, f in zip(pairs, locked, strict=True)
+    ]
+    each, damping = tuple(m.frequency for m in near), _mean([m.damping for m in near])
     # it moves with the posture: one number stands for all of them
-    scatter = float(np.std([v.value for v in each]))
-    measured = frequency * max(v.std / v.value for v in each)
-    fitted = 0.5 * frequency * one.std[-2]
-    return Finding(
-        kind="joint",
-        joint=own.number,
-        evidence=words,
-        cause=_JOINT,
-        frequency=Known(frequency, float(np.hypot(scatter, measured))),
-        damping=damping,
-        parameters={
-            "stiffness": Known(k, k * one.std[-2]),
-            "damping": Known(d, float(np.sqrt(slope @ known @ slope))),
-            "frequency": Known(frequency, float(np.hypot(scatter, fitted))),
-            "motor_inertia": Known(motor, motor * one.std[-1]),
-        },
-        seen_at=(own.number,),
-        frequencies=each,
-    )
+    frequency = float(np.sqrt(k / link.mean()) / (2.0 * np.pi))
+    scatter = float(np.std([f.value for f in each]))
+    measured = frequency * max(f.std / f.value for f in each)
+    # d = 2 ζ √(k (J - J_m))
+    d = float(np.mean([2.0 * m.damping.value for m in near] * np.sqrt(k * link)))
+    parts = (damping.std / abs(damping.value), 0.5 * k_std, 0.5 * motor * motor_std / link.mean())
+    about = {
+        "stiffness": Known(k, k * k_std),
+        "damping": Known(d, d * float(np.linalg.norm(parts))),
+        "frequency": Known(frequency, float(np.hypot(scatter, 0.5 * frequency * k_std))),
+        "motor_inertia": Known(motor, motor * motor_std),
+    }
+    known = Known(frequency, float(np.hypot(scatter, measured)))
+    return Finding("joint", joint, words, _JOINT, known, damping, about, (joint,), each)
 
 
 def _mean(values: Sequence[Known]) -> Known:
@@ -371,102 +288,121 @@ def _mean(values: Sequence[Known]) -> Known:
     return Known(mean, float(np.sqrt(max(scatter, 1.0) / weight.sum())))
 
 
-def _late(
-    modes: Sequence[Modes], sample_time: float, held: bool, config: GroupingConfig
-) -> Known | None:
-    """Return the delay [s], where there is one, of either sign."""
-    mean = _mean([m.delay for m in modes])
-    least = max((config.delay if held else 1.0) * sample_time, config.sure * mean.std)
-    return mean if np.isfinite(mean.value) and abs(mean.value) >= least else None
-
-
-def _early(own: _Joint, early: Known) -> Open:
-    other, candidates = "", tuple[str, ...]()
-    if own.flat >= own.config.flat:
-        candidates = (_JOINT, _BASE)
-        other = ", or a mode outside the excited band: the magnitude changes by a factor of "
-        other += f"{own.flat:.3g}"
-    words = (
-        f"The phase advances as with {-1e3 * early.value:.3g} ms of time gained. No lag does that: "
-        "faster motion has folded back (aliasing), or torque and position have different clocks"
-        f"{other}."
-    )
-    ask = "all signals by one clock, at the controller's own rate"
-    return own.open(None, candidates, words, ask)
-
-
-def _delay(own: _Joint, late: Known) -> Grouped:
-    each = f"{1e3 * late.value:.3g} ± {2e3 * late.std:.2g}"
-    if own.flat < own.config.flat:
-        words = (
-            f"Beside its modes the magnitude is flat within {100.0 * (own.flat - 1.0):.2g} % and "
-            f"the phase falls in proportion to the frequency: position comes {each} ms late in "
-            f"{own.postures}, beyond hold and controller."
-        )
-        seen, told = (own.number,), {"delay": late}
-        found = Finding("delay", own.number, words, "time_delay", parameters=told, seen_at=seen)
-        return [found], []
-    words = (
-        f"The phase falls as with {each} ms of delay, but the magnitude is not flat: a factor of "
-        f"{own.flat:.3g}."
-    )
-    ask = "the measured motor current beside the command"
-    return [], [own.open(None, ("drive_lag", "time_delay", "torque_lag"), words, ask)]
-
-
-def _rigid(own: _Joint) -> Grouped:
-    config, (low, high) = own.config, own.band
-    if high < config.span * low:
-        words = (
-            f"No mode is distinct from {low:.3g} to {high:.3g} Hz; more than that the excitation "
-            "does not tell."
-        )
-        ask = "stronger excitation, to lower and higher frequencies"
-        return [], [own.open(None, (_JOINT, _BASE), words, ask)]
-    if own.flat >= config.flat:
-        words = (
-            "No mode is distinct, yet the acceleration per input changes by a factor of "
-            f"{own.flat:.3g}."
-        )
-        ask = "longer, with stronger excitation, and in a second posture"
-        return [], [own.open(None, ("drive_lag", _JOINT, "backlash"), words, ask)]
-    # pairs that nearly cancel, the same in every posture: one alone is as likely noise
-    each = [[m.frequency for m in one.traces if m.kind == "resonance"] for one in own.modes]
-    traces = [
-        first
-        for first in (each[0] if len(each) > 1 else [])
-        if all(any(_same(first, one, config) for one in rest) for rest in each[1:])
-    ]
-    kind, beside = "mode", ""
-    if traces:
-        kind = "distinct mode"
-        beside = f" Pairs that nearly cancel recur at {_many(traces)} Hz: of a base, or of another "
-        beside += "joint."
-    words = (
-        f"No {kind} from {low:.3g} to {high:.3g} Hz in {own.postures}: the acceleration per input "
-        f"is flat within {100.0 * (own.flat - 1.0):.2g} %, without delay.{beside}"
-    )
-    return [Finding("rigid", own.number, words, seen_at=(own.number,))], []
-
-
-def _which(own: _Joint, pairs: list[list[Pair]], why: str) -> Open:
-    """Ask whether base or joint is compliant."""
-    first = min((p.resonance.frequency for one in pairs for p in one), key=lambda f: f.value)
-    ask = f"joint {own.number} in a further posture of the other joints that changes its inertia "
-    words = f"{why[0].upper()}{why[1:]}."
-    return own.open(first, (_BASE, _JOINT), words, f"{ask}by a tenth or more")
-
-
-def _told(own: _Joint, pairs: list[list[Pair]]) -> str:
-    low = [p.antiresonance.frequency for one in pairs for p in one]
-    high = [p.resonance.frequency for one in pairs for p in one]
-    moved = ", ".join(f"{j:.3g}" for j in own.inertia)
-    seen = f"Antiresonance at {_many(low)} Hz, resonance at {_many(high)} Hz"
-    return f"{seen}, with {moved} {own.unit} at the joint"
-
-
 def _many(values: Sequence[Known]) -> str:
     return ", ".join(f"{v.value:.4g}" for v in values)
+
+
+def predicted(
+    inertia: float, base: Spring | None, joint: Spring | None, rotor: float = 0.0
+) -> tuple[Array, Array]:
+    """Antiresonances and resonances [Hz], sorted, of a joint with `inertia` [kg m^2].
+
+    NaN where no such bodies exist. `rotor` [kg m^2] of the inertia turns behind a gear, and does
+    not ride on the base.
+    """
+    f_b, i_b = base or (1.0, 1.0)
+    k, motor = joint or (1.0, 0.5 * inertia)
+    link, rides = inertia - motor, inertia - rotor
+    springs = [row for row, one in ((0, base), (2, joint)) if one]
+    numbers = np.array([f_b * f_b * i_b, k, link, motor, i_b, rides])
+    if not np.isfinite(numbers).all() or not numbers[2:].min() > 1e-12 * inertia:  # numerics
+        none = np.full(len(springs), np.nan)
+        return none, none
+    mass = np.array([[i_b + rides, rides, link], [rides, inertia, link], [link, link, link]])
+    stiffness = np.diag([i_b * (2.0 * np.pi * f_b) ** 2, 0.0, k])
+    found = []
+    for rows in (springs, [*springs, 1]):  # q locked; free
+        own = np.ix_(rows, rows)
+        values = np.linalg.eigvals(np.linalg.solve(mass[own], stiffness[own])).real
+        found.append(np.sort(np.sqrt(np.maximum(values, 0.0))) / (2.0 * np.pi))
+    return found[0], found[1][1:]
+
+
+def explain(
+    pairs: Sequence[Sequence[Pair]],
+    inertia: Sequence[float],
+    springs: tuple[bool, bool],
+    inertia_std: Sequence[float] = (),
+    config: GroupingConfig | None = None,
+) -> Explained | None:
+    """Return what explains the pairs of every posture best; None where counts differ.
+
+    Args:
+        pairs: of each posture, by frequency; as many as there are springs.
+        inertia: J of each posture [kg m^2].
+        springs: whether there is one at the base, and in the joint.
+        inertia_std: relative, of J in each posture; none: exactly known.
+        config: what frequencies are granted, and what a base weighs at least.
+    """
+    config = config or GroupingConfig()
+    with_base, with_joint = springs
+    count = int(with_base) + int(with_joint)
+    if any(len(own) != count for own in pairs):
+        return None
+    modes = [[*(p.antiresonance for p in own), *(p.resonance for p in own)] for own in pairs]
+    measured = np.log([[m.frequency.value for m in own] for own in modes])
+    std = np.array([[m.frequency.std / m.frequency.value for m in own] for own in modes])
+    if len(inertia_std):
+        std = np.hypot(std, 0.5 * np.array(inertia_std)[:, None])
+    granted = np.hypot(std, config.granted)
+    geared = springs == (True, False)
+
+    def bodies(theta: Array) -> tuple[Spring | None, Spring | None, float]:
+        with np.errstate(over="ignore"):
+            values = np.exp(theta[: 2 * count]).tolist()
+        base = (values[0], values[1]) if with_base else None
+        joint = (values[-2], values[-1]) if with_joint else None
+        # 0 … `rotor` of any real number
+        share = 0.5 * config.rotor * (1.0 + float(np.tanh(0.5 * theta[-1]))) if geared else 0.0
+        return base, joint, share * min(inertia)
+
+    def rest(theta: Array) -> Array:
+        base, joint, rotor = bodies(theta)
+        rows = [np.concatenate(predicted(j, base, joint, rotor)) for j in inertia]
+        off = ((np.log(rows) - measured) / granted).ravel()
+        off = np.where(np.isfinite(off), off, config.impossible)
+        if not geared:
+            return off
+        # a base of nothing, under a rotor, is a link on a spring
+        light = min(theta[1] - np.log(config.light * np.mean(inertia)), 0.0) / config.granted
+        return np.append(off, light)
+
+    def chi_squared(found: Minimum) -> float:
+        return float(found.rest @ found.rest)
+
+    starts = [
+        [*start, *rotor]
+        for start in _starts(pairs[0], inertia[0], springs)
+        for rotor in ([[-4.0], [0.0]] if geared else [[]])
+    ]
+    best = min((least_squares(rest, np.array(start)) for start in starts), key=chi_squared)
+    # the rest, not what was granted, says how well the numbers are known
+    weight = np.ones(len(best.rest))
+    weight[: std.size] = (granted / np.maximum(std, config.exact)).ravel()
+    freedom = std.size - len(best.x)
+    scatter = float(((best.rest * weight) ** 2).sum()) / max(freedom, 1)
+    slope = best.slope * weight[:, None]
+    covariance = np.linalg.pinv(slope.T @ slope)[: 2 * count, : 2 * count] * max(scatter, 1.0)
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    worst = float(np.abs(best.rest[: std.size] * granted.ravel()).max())
+    base, joint, _ = bodies(best.x)
+    return Explained(base, joint, deviations, chi_squared(best), worst, freedom, config)
+
+
+def _starts(first: Sequence[Pair], inertia: float, springs: tuple[bool, bool]) -> list[list[float]]:
+    """Each pair of the first posture taken for either spring."""
+
+    def as_base(p: Pair) -> list[float]:
+        return [np.log(p.resonance.frequency.value), np.log(inertia / max(p.rise - 1.0, 1e-6))]
+
+    def as_joint(p: Pair) -> list[float]:
+        motor = inertia / max(p.rise, 1.0 + 1e-6)
+        omega = 2.0 * np.pi * p.antiresonance.frequency.value
+        return [np.log((inertia - motor) * omega**2), np.log(motor)]
+
+    if all(springs):
+        return [as_base(first[i]) + as_joint(first[1 - i]) for i in (0, 1)]
+    return [as_base(first[0]) if springs[0] else as_joint(first[0])]
 
 
 def seen_elsewhere(
@@ -474,61 +410,37 @@ def seen_elsewhere(
 ) -> tuple[tuple[Finding, ...], tuple[Open, ...]]:
     """Where the base is known, what other joints show at its frequency is the base as well.
 
-    A base turns under the first joint before any other. What shows at one further joint alone,
-    while another bends on a spring, may be that spring, where it is faint or stands still where
-    that spring would make it: its link swings against a motor that its own controller, or friction,
-    holds, and takes the motion away (a tuned absorber: Den Hartog 1934, chapter III).
+    A base turns under the first joint before any other. What shows at a further joint alone, while
+    another bends on a spring, may be that spring: its link swings against a motor that is held.
     """
     config = config or GroupingConfig()
+
+    def same(frequency: Known | None, base: Finding) -> bool:
+        if frequency is None or base.frequency is None:
+            return False
+        return abs(frequency.value - base.frequency.value) < config.near * base.frequency.value
+
     rest = [one for one in sure if one.kind != "base"]
-    merged: list[Finding] = []
+    bent = [one.joint for one in rest if one.kind == "joint"]
+    bases: list[Finding] = []
     for one in (one for one in sure if one.kind == "base"):
-        at = _place(merged, one.frequency, config)
+        at = next((i for i, base in enumerate(bases) if same(one.frequency, base)), None)
         if at is None:
-            merged.append(one)
-            continue
-        seen_at = (*merged[at].seen_at, *one.seen_at)
-        merged[at] = replace(merged[at], seen_at=seen_at, faint=merged[at].faint and one.faint)
-    left = []
-    for one in [one for one in merged if len(one.seen_at) == 1 and one.seen_at != (1,)]:
-        # at its own joint a spring has a pair of its own
-        bent = [b for b in rest if b.kind == "joint" and b.joint != one.seen_at[0]]
-        springs = [b for b in bent if _absorbed(one, b, config)] or (bent if one.faint else [])
-        if springs:
-            merged.remove(one)
-            left.append(_trace(one, springs[0]))
+            bases.append(one)
+        else:
+            bases[at] = replace(bases[at], seen_at=(*bases[at].seen_at, *one.seen_at))
+    left: list[Open] = []
+    for one in list(bases):
+        others = [joint for joint in bent if joint != one.seen_at[0]]
+        if len(one.seen_at) == 1 and one.seen_at != (1,) and others:
+            bases.remove(one)
+            words = f"{one.evidence} But only this joint shows it, and joint {others[0]} bends."
+            record = f"joint {others[0]} made firm, or its brake closed, then this joint again"
+            left.append(Open(one.seen_at[0], one.frequency, (_BASE, _JOINT, _GAP), words, record))
     for question in unsure:
-        at = _place(merged, question.frequency, config) if _BASE in question.candidates else None
-        if at is None:
+        at = next((i for i, base in enumerate(bases) if same(question.frequency, base)), None)
+        if at is None or _BASE not in question.candidates:
             left.append(question)
-        elif question.joint not in merged[at].seen_at:
-            merged[at] = replace(merged[at], seen_at=(*merged[at].seen_at, question.joint))
-    return (*merged, *rest), tuple(left)
-
-
-def _place(bases: list[Finding], frequency: Known | None, config: GroupingConfig) -> int | None:
-    """Place of the base at this frequency."""
-    same = (k for k, one in enumerate(bases) if _same(one.frequency, frequency, config))
-    return next(same, None)
-
-
-def _absorbed(base: Finding, spring: Finding, config: GroupingConfig) -> bool:
-    """Return whether all that stands still for the base does so where the spring's link swings."""
-    own = spring.frequency
-    if own is None or not base.stands:
-        return False
-    return all(abs(one.value - own.value) < config.locked * own.value for one in base.stands)
-
-
-def _trace(base: Finding, spring: Finding) -> Open:
-    joint = base.seen_at[0]
-    words = (
-        f"{base.evidence} But {'the pair is small, ' if base.faint else ''}it is sure at this "
-        f"joint alone, and it may be a trace of joint {spring.joint}, which bends."
-    )
-    ask = f"joint {spring.joint} made firm, or its brake closed, then joint {joint} again"
-    return Open(joint, base.frequency, (_BASE, _JOINT), words, ask)
-
-
-def _same(a: Known | None, b: Known | None, config: GroupingConfig) -> bool:
-    return a is not None and b is not None and abs(a.value - b.value) < config.near * a.value
+        elif question.joint not in bases[at].seen_at:
+            bases[at] = replace(bases[at], seen_at=(*bases[at].seen_at, question.joint))
+    return (*bases, *rest), tuple(left)

@@ -6,26 +6,22 @@ The response over the sampled double integrator is the acceleration beside that 
 the controller's model describes: 1 where that model is right, under any hold. A rational
 function is fitted to it. An antiresonance with a resonance above it is a compliant part; what
 it carries drops out above it, and the level rises by (f_r / f_a)².
-
-Deviations hold noise, and how far a mode moves along the turn: the inertia about a joint's own axis
-is the same at every angle of that joint; what couples it to the base and to the joints before it is
-not, and one number stands for all angles.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from pipelines.frequency.config import ModesConfig, RationalConfig
 from pipelines.frequency.controller import double_integrator, loop_delay
-from pipelines.frequency.rational import FEWEST, Known, Mode, Rational, fit_rational, scattered
+from pipelines.frequency.rational import FEWEST, Known, Mode, Rational, fit_rational
 from pipelines.frequency.responses import Measured
-from pipelines.frequency.signals import INPUT, POSITION
-from pipelines.frequency.spectra import Array, Complex, FrequencyResponse
+from pipelines.frequency.spectra import Array, Complex, FrequencyResponse, inside
 
-__all__ = ["BAND", "Modes", "Pair", "fitted_modes", "relative_acceleration", "tells"]
+__all__ = ["BAND", "Modes", "Pair", "fitted_modes", "informative", "relative_acceleration"]
 
 _CONFIG = ModesConfig()
 BAND = _CONFIG.band  # numerics: [Hz] in which modes are looked for
@@ -48,57 +44,41 @@ class Pair:
 class Modes:
     """Of one response."""
 
-    modes: tuple[Mode, ...]  # distinct ones, by frequency
-    traces: tuple[Mode, ...]  # of pairs that nearly cancel: alone they name nothing
+    modes: tuple[Mode, ...]  # by frequency
     pairs: tuple[Pair, ...]
     single: tuple[Mode, ...]  # that have no partner
     level: Known  # of the rigid body above friction and below the modes: 1 if its inertia is right
-    level_above: Known  # above all modes
     delay: Known  # [s], beside the hold and the controller's own delay
     flat: float  # largest deviation from `level` beside the modes, as a ratio ≥ 1
     inertia: Known | None  # [kg m^2] that the torque moves below the modes
-    friction_below: float  # [Hz] below which friction and load change the magnitude; 0: nowhere
     misfit: float  # 1 where the rational function explains all but the noise
-    left: float  # two of it hold 95 % of the bins about the fit, as a share of the response
+    scatter: float  # two of it hold 95 % of the bins about the fit, as a share of the response
+    hidden: float  # two of it hold 95 % of their means over as much as a mode is wide
     band: tuple[float, float]  # [Hz] of the fit
+    relative: FrequencyResponse  # acceleration per input
     fit: Rational
-    slack: float = (
-        _CONFIG.held_still
-    )  # relative, of a frequency that masses and springs are granted
-
-    @property
-    def faint(self) -> tuple[Pair, ...]:
-        """Pairs of the traces."""
-        return _paired(self.traces)[0]
 
 
 def relative_acceleration(measured: Measured) -> FrequencyResponse:
-    """Return the plant's response over the double integrator, sampled and delayed as the loop was.
-
-    The other joints are held.
-    """
-    response = measured.held.response if measured.held else measured.plant
-    return response.times(np.asarray(1.0 / _rigid(measured, response.frequency)))
-
-
-def _rigid(measured: Measured, frequency: Array) -> Complex:
-    first = measured.first
+    """Return the plant's response over the double integrator, sampled and late as the loop was."""
+    first, plant = measured.first, measured.held or measured.plant
     _, delay = loop_delay(first.controller, first.quantity)
-    return double_integrator(frequency, first.sample_time, delay, first.held)
+    rigid = double_integrator(plant.frequency, first.sample_time, delay, first.held)
+    return plant.times(np.asarray(1.0 / rigid))
 
 
-def tells(measured: Measured, band: tuple[float, float] = BAND) -> bool:
+def informative(measured: Measured, band: tuple[float, float] = BAND) -> bool:
     """Return whether enough of `band` [Hz] is excited for a fit, and nothing has folded into it."""
-    part = _in_band(measured, relative_acceleration(measured), band)
-    return not measured.aliased and len(part.frequency) >= FEWEST
+    count = len(_in_band(measured, measured.plant, band).frequency)
+    return not measured.aliased and count >= FEWEST
 
 
 def _in_band(
     measured: Measured, response: FrequencyResponse, band: tuple[float, float]
 ) -> FrequencyResponse:
     """Return the bins of `band` [Hz] that are excited, and sampled well enough."""
-    inside = response.within(band[0], min(band[1], _CONFIG.of_rate * measured.first.rate))
-    return inside.where(measured.excited.holds(inside.frequency))
+    part = response.within(band[0], min(band[1], _CONFIG.of_rate * measured.first.rate))
+    return part.where(inside(measured.excited, part.frequency))
 
 
 def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
@@ -110,36 +90,35 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     relative = relative_acceleration(measured)
     part = _in_band(measured, relative, band)
     fit = _fitted(part)
-    seen = [
-        (own, wide)
-        for own, wide in zip(fit.modes(), _as_uncertain(measured, part, fit), strict=True)
-        if measured.excited.holds(np.array(own.frequency.value))
-    ]
-    modes = tuple(wide for own, wide in seen if own.distinct and _is_mode(own))
-    traces = tuple(wide for own, wide in seen if not own.distinct and _is_trace(own))
+    modes = tuple(
+        replace(mode, damping=_of_friction(mode.damping))
+        for mode in fit.modes()
+        if mode.damping.value < _CONFIG.stiffest
+        and mode.frequency.std < _CONFIG.sure * mode.frequency.value
+        and inside(measured.excited, np.array(mode.frequency.value))
+    )
     pairs, single = _paired(modes)
-    level, delay = _level_and_delay(part.times(1.0 / _carried(modes, part.frequency)))
-    rises = [
-        (f.std / f.value) for p in pairs for f in (p.antiresonance.frequency, p.resonance.frequency)
-    ]
-    rise, rise_std = float(np.prod([p.rise for p in pairs])), 2.0 * float(np.linalg.norm(rises))
-    above = level.value * rise
+    level, delay = _level_and_delay(part, fit, _carried(modes, part.frequency))
     smooth = np.arange(_CONFIG.straight[0], min(_CONFIG.straight[1], part.frequency[-1]), 1.0)
     size = np.abs(fit.response(smooth) / _carried(modes, smooth)) / level.value
+    scatter, hidden = _scatter(fit, part)
+    inertia = None
+    if measured.torque_per_input is not None:
+        value = measured.torque_per_input / level.value
+        inertia = Known(value, abs(value) * level.std / level.value)
     return Modes(
         modes=modes,
-        traces=traces,
         pairs=pairs,
         single=single,
         level=level,
-        level_above=Known(above, float(np.hypot(level.std * rise, above * rise_std))),
         delay=delay,
         flat=float(max(size.max(), 1.0 / size.min())),
-        inertia=_inertia(measured, level),
-        friction_below=_friction_below(measured, relative, level),
+        inertia=inertia,
         misfit=fit.misfit,
-        left=_left(fit, part, measured),
+        scatter=scatter,
+        hidden=hidden,
         band=(float(part.frequency[0]), float(part.frequency[-1])),
+        relative=relative,
         fit=fit,
     )
 
@@ -148,33 +127,19 @@ def _fitted(part: FrequencyResponse) -> Rational:
     """Fit the rational function; where the search got stuck, without a delay if that is better."""
 
     def fit(with_delay: bool) -> Rational:
-        weights = (part.variance, with_delay, part.correlated, part.freedom)
-        return fit_rational(part.frequency, part.response, *weights)
+        return fit_rational(
+            part.frequency,
+            part.response,
+            part.variance,
+            with_delay=with_delay,
+            correlated=part.correlated,
+            freedom=part.freedom,
+        )
 
     first = fit(True)
     if first.misfit < _CONFIG.stuck:
         return first
     return min(first, fit(False), key=lambda one: one.description)
-
-
-def _left(fit: Rational, part: FrequencyResponse, measured: Measured) -> float:
-    """Half of the deviation that 95 % of bins have at most, by what the fit leaves or their noise.
-
-    The noise is that of the plant as measured: taking out other joints also takes what shakes all,
-    the impacts of a gap, from what is known of the rest. What the reading of the position alone
-    explains hides no mode that is as wide as `seen_over`: of that noise counts what its mean has.
-    """
-    inside = part.within(*_CONFIG.straight)
-    f, share = inside.frequency, 0.95  # numerics: two deviations
-    same = np.isin(measured.plant.frequency, f)
-    plant, read = measured.plant.where(same), measured.by_sensor[same]
-    rest = np.abs(inside.response / fit.response(f) - 1.0)
-    off = np.maximum(rest**2, plant.variance / np.abs(plant.response) ** 2)
-    spacing = part.correlated * float(np.median(np.diff(part.frequency)))
-    by_reading = -np.log(1.0 - share) * read  # 95 % of |n|² of complex Gaussian noise
-    averaged = by_reading / np.maximum(_CONFIG.seen_over * f / spacing, 1.0)
-    own = np.maximum(off - by_reading, 0.0) + averaged
-    return 0.5 * float(np.sqrt(np.quantile(own, share)))
 
 
 def _carried(modes: tuple[Mode, ...], frequency: Array) -> Complex:
@@ -187,147 +152,66 @@ def _carried(modes: tuple[Mode, ...], frequency: Array) -> Complex:
     return value
 
 
-def _level_and_delay(rest: FrequencyResponse) -> tuple[Known, Known]:
-    """Mean size of the rest, and the slope of its phase beside the 1/ω of friction.
+def _level_and_delay(
+    part: FrequencyResponse, fit: Rational, carried: Complex
+) -> tuple[Known, Known]:
+    """Mean size of the rest beside the modes, and the slope of its phase beside friction's 1/ω.
 
     By weighted least squares; deviations hold what scatters in fact, were that more than the noise.
     """
-    part = rest.within(*_CONFIG.straight)
-    relative = 0.5 * part.variance / np.abs(part.response) ** 2
-    part = part.where(relative < _CONFIG.vague)
-    if len(part.frequency) < _CONFIG.fewest:
-        size = float(np.median(np.abs(rest.response)))
+    rest = part.times(1.0 / carried).within(*_CONFIG.straight)
+    relative = 0.5 * rest.variance / np.abs(rest.response) ** 2
+    rest, relative = rest.where(relative < _CONFIG.vague), relative[relative < _CONFIG.vague]
+    if len(rest.frequency) < _CONFIG.fewest:
+        size = float(np.median(np.abs(part.response / carried)))
         return Known(size, np.inf), Known(0.0, np.inf)
-    relative = np.maximum(relative[relative < _CONFIG.vague], RationalConfig().floor ** 2)
-    weight, omega = 1.0 / relative, 2.0 * np.pi * part.frequency
-    # the delay that lays all phases on zero best: no phase has to be unwrapped then
-    tried = np.arange(-_CONFIG.longest, _CONFIG.longest, 0.5 / float(omega.max()))
-    unit = weight * part.response / np.abs(part.response)
-    rough = float(tried[np.argmax((np.exp(1j * np.outer(tried, omega)) @ unit).real)])
-    straight = part.response * np.exp(1j * omega * rough)
+    weight = 1.0 / np.maximum(relative, RationalConfig().floor ** 2)
+    omega = 2.0 * np.pi * rest.frequency
+    straight = rest.response * np.exp(1j * omega * fit.delay)
     middle = np.sum(weight * straight / np.abs(straight))
     phase = np.angle(straight / middle) + np.angle(middle)
-    columns = np.ones((len(omega), 1))
-    level, level_std = _weighted(columns, np.log(np.abs(straight)), weight, part.correlated)
-    columns = np.column_stack([-omega, 1.0 / omega])
-    slope, slope_std = _weighted(columns, phase, weight, part.correlated)
-    value = float(np.exp(level))
-    return Known(value, value * level_std), Known(rough + slope, slope_std)
+    ones = np.ones((len(omega), 1))
+    log_level = _weighted(ones, np.log(np.abs(straight)), weight, part.correlated)
+    slope = _weighted(np.column_stack([-omega, 1.0 / omega]), phase, weight, part.correlated)
+    level = float(np.exp(log_level.value))
+    return Known(level, level * log_level.std), Known(fit.delay + slope.value, slope.std)
 
 
-def _weighted(columns: Array, y: Array, weight: Array, correlated: float) -> tuple[float, float]:
-    """Return the number of the first column, and its std."""
-    normal = (columns * weight[:, None]).T @ columns
-    scale = np.sqrt(np.diag(normal))
-    inverse = np.linalg.inv(normal / np.outer(scale, scale)) / np.outer(scale, scale)
-    found = inverse @ (columns.T @ (weight * y))
-    misfit = float(weight @ (y - columns @ found) ** 2) / max(len(y) - len(found), 1)
-    return float(found[0]), float(np.sqrt(inverse[0, 0] * correlated * max(misfit, 1.0)))
+def _weighted(columns: Array, y: Array, weight: Array, correlated: float) -> Known:
+    """Return the number of the first column."""
+    scale = np.sqrt((columns**2 * weight[:, None]).sum(axis=0))
+    unit = columns / scale
+    inverse = np.linalg.inv((unit * weight[:, None]).T @ unit)
+    found = inverse @ (unit.T @ (weight * y))
+    misfit = float(weight @ (y - unit @ found) ** 2) / max(len(y) - len(found), 1)
+    std = np.sqrt(inverse[0, 0] * correlated * max(misfit, 1.0)) / scale[0]
+    return Known(float(found[0] / scale[0]), float(std))
 
 
-def _inertia(measured: Measured, level: Known) -> Known | None:
-    """Inertia below the modes, as uncertain as level and coupling are."""
-    ratio, drawn = measured.torque_per_input, 0.0
-    if ratio is None:
-        return None
-    if measured.held is not None:
-        f = measured.held.response.frequency
-        inside = (f >= _CONFIG.straight[0]) & (f <= _CONFIG.straight[1])
-        share = np.abs(measured.held.draws / measured.held.response.response)[:, inside]
-        drawn = float(np.log(share).mean(axis=1).std()) if inside.any() else 0.0
-    value = ratio / level.value
-    return Known(value, abs(value) * float(np.hypot(level.std / level.value, drawn)))
+def _scatter(fit: Rational, part: FrequencyResponse) -> tuple[float, float]:
+    """Half of the deviation that 95 % of bins, or of their local means, have at most.
 
-
-def _is_mode(mode: Mode) -> bool:
-    """One that is known."""
-    f = mode.frequency
-    return mode.damping.value < _CONFIG.stiffest and f.std < _CONFIG.sure * f.value
-
-
-def _is_trace(mode: Mode) -> bool:
-    return _is_mode(mode) and mode.damping.value > _CONFIG.seen * mode.damping.std
-
-
-def _as_uncertain(measured: Measured, part: FrequencyResponse, fit: Rational) -> tuple[Mode, ...]:
-    """Return the modes, as uncertain as coupling, movement along the turn and friction make them.
-
-    Of the scatter of two periods the noise is taken off.
+    By what the fit leaves or by noise. A mode that noise hides is narrower than such a mean.
     """
-    modes = fit.modes()
-    if not modes:
-        return ()
-    others = []
-    along = _along_turn(measured, part.frequency)
-    if along is not None:
-        others.append(along)
-    if measured.held is not None:
-        inside = np.isin(measured.held.response.frequency, part.frequency)
-        others.append((measured.held.draws[:, inside], 0.0))
-    spread = [np.array([(m.frequency.std, m.damping.std) for m in modes]) ** 2]
-    for responses, noise in others:
-        relative = responses / _rigid(measured, part.frequency)
-        apart = scattered(fit, part.frequency, relative, part.variance).modes()
-        own = np.array([(m.frequency.std, m.damping.std) for m in apart]) ** 2
-        spread.append(np.maximum(own - noise * spread[0], 0.0))
-    stds = np.sqrt(np.sum(spread, axis=0)).tolist()
-    wider = []
-    for mode, (frequency_std, damping_std) in zip(modes, stds, strict=True):
-        value = mode.damping.value
-        damping = Known(value, float(np.hypot(damping_std, _CONFIG.by_friction * abs(value))))
-        frequency = Known(mode.frequency.value, frequency_std)
-        wider.append(replace(mode, frequency=frequency, damping=damping))
-    return tuple(wider)
+    rest = part.within(*_CONFIG.straight)
+    f, share = rest.frequency, 0.95  # numerics: two deviations
+    left = np.abs(rest.response / fit.response(f) - 1.0) ** 2
+    spread = np.maximum(left, rest.variance / np.abs(rest.response) ** 2)
+    spacing = part.correlated * float(np.median(np.diff(part.frequency)))
+    bins = np.maximum(_CONFIG.seen_over * f / spacing, 1.0)
+    of_bins, of_means = np.sqrt(np.quantile([spread, spread / bins], share, axis=1))
+    return 0.5 * float(of_bins), 0.5 * float(of_means)
 
 
-def _along_turn(measured: Measured, frequency: Array) -> tuple[Complex, float] | None:
-    """Responses u → q (parts, bins) of two periods at a time at lines of a multisine [Hz] (bins,).
-
-    Hann's window keeps the lines of one period apart and the slow pull of gravity out. The second
-    number is the variance of a part over that of the mean, where noise is all that differs. None of
-    other excitations, and of too few periods.
-    """
-    period = measured.first.period
-    if measured.plant.method != "multisine" or period is None:
-        return None
-    line = 2 * np.rint(frequency * period * measured.first.sample_time).astype(np.int64)
-    window = (0.5 - 0.5 * np.cos(np.pi * np.arange(2 * period) / period))[:, None]
-    parts, periods = [], 0
-    for stretch in (s for one in measured.turned for s in one.stretches):
-        count = len(stretch.signals) // period
-        if count <= 1:
-            continue
-        periods += count
-        whole = stretch.signals[len(stretch.signals) - count * period :, [INPUT, POSITION]]
-        for first in range(0, (count - 1) * period, period):
-            part = whole[first : first + 2 * period]
-            u, q = np.fft.rfft((part - part.mean(axis=0)) * window, axis=0)[line].T
-            if (u != 0.0).all():
-                parts.append(q / u)
-    return (np.array(parts), _CONFIG.hann * periods) if len(parts) >= _CONFIG.parts else None
+def _of_friction(damping: Known) -> Known:
+    """Return the damping as uncertain as friction makes it where v swings the speed."""
+    return replace(damping, std=float(np.hypot(damping.std, _CONFIG.by_friction * damping.value)))
 
 
 def _paired(modes: tuple[Mode, ...]) -> tuple[tuple[Pair, ...], tuple[Mode, ...]]:
     """Each antiresonance with the resonance that follows it; and what has no partner."""
-    pairs: list[Pair] = []
-    single: list[Mode] = []
-    waiting: list[Mode] = []  # the mode before, an antiresonance
-    for mode in modes:
-        if waiting and mode.kind == "resonance":
-            pairs.append(Pair(waiting.pop(), mode))
-        elif mode.kind == "resonance":
-            single.append(mode)
-        else:
-            single += waiting
-            waiting = [mode]
-    single += waiting
-    return tuple(pairs), tuple(single)
-
-
-def _friction_below(measured: Measured, relative: FrequencyResponse, level: Known) -> float:
-    """Up to where, from below, the magnitude is a tenth off, or the coherence too low to say."""
-    low = relative.where(measured.excited.holds(relative.frequency)).within(0.0, 2.0 * BAND[0])
-    size = abs(level.value)
-    off = np.abs(np.abs(low.response) / size - 1.0) > _CONFIG.friction
-    known = np.sqrt(low.variance) < 0.5 * _CONFIG.friction * size
-    return float(low.frequency[off & known].max(initial=0.0))
+    pairs = tuple(
+        Pair(a, b) for a, b in pairwise(modes) if (a.kind, b.kind) == ("antiresonance", "resonance")
+    )
+    partners = {id(mode) for pair in pairs for mode in (pair.antiresonance, pair.resonance)}
+    return pairs, tuple(mode for mode in modes if id(mode) not in partners)

@@ -20,8 +20,7 @@ by Gauss-Newton steps on all parameters (Levenberg 1944, Marquardt 1963).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -29,10 +28,8 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.frequency.config import RationalConfig
 from pipelines.frequency.spectra import Array, Complex
-from pipelines.io.results import NOT_STORED
 
-__all__ = ["FEWEST", "Known", "Mode", "Rational", "fit_rational", "inverse"]
-__all__ += ["scattered"]
+__all__ = ["FEWEST", "Known", "Mode", "Rational", "fit_rational"]
 
 _CONFIG = RationalConfig()
 FEWEST = _CONFIG.fewest  # numerics: bins of a fit at least
@@ -53,8 +50,6 @@ class Mode:
     kind: Literal["resonance", "antiresonance"]
     frequency: Known  # undamped [Hz]
     damping: Known  # ratio [1]
-    # False where one of the other kind takes it away within two standard deviations
-    distinct: bool = field(default=True, metadata=NOT_STORED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,19 +68,37 @@ class Rational:
     misfit: float = np.inf  # mean |Ĝ - H|² / variance: 1 where model and variance are right
     description: float = np.inf  # length of the description, of the same data
 
+    @property
+    def delay(self) -> float:
+        """[s]."""
+        return float(self.parameters[1] / self.unit)
+
     def response(self, frequency: Array) -> Complex:
         """H at these frequencies [Hz]."""
         s = np.asarray(2j * np.pi / self.unit * frequency, dtype=np.complex128)
         return _product(self.parameters, s, self.zeros)[0]
 
-    def modes(self, beyond: float = 1.0) -> tuple[Mode, ...]:
-        """Complex pairs with a frequency in the band, or up to `beyond` times its upper end."""
+    def modes(self) -> tuple[Mode, ...]:
+        """Complex pairs in the band, by frequency.
+
+        An antiresonance and a resonance that are equal within their deviations take each other
+        away: they are no modes.
+        """
         found = [self._mode(k) for k in range(self.zeros + self.poles)]
-        low, high = self.band[0], beyond * self.band[1]
-        inside = [m for m in found if m is not None and low <= m.frequency.value <= high]
-        gone = _cancelled(inside)
-        marked = [replace(m, distinct=i not in gone) for i, m in enumerate(inside)]
-        return tuple(sorted(marked, key=lambda m: m.frequency.value))
+        low, high = self.band
+        modes = [m for m in found if m is not None and low <= m.frequency.value <= high]
+        near = sorted(
+            (_apart(zero, pole), i, k)
+            for i, zero in enumerate(modes)
+            for k, pole in enumerate(modes)
+            if (zero.kind, pole.kind) == ("antiresonance", "resonance")
+        )
+        gone: set[int] = set()
+        for apart, i, k in near:
+            if apart <= _CONFIG.cancels and not gone & {i, k}:
+                gone |= {i, k}
+        distinct = [m for i, m in enumerate(modes) if i not in gone]
+        return tuple(sorted(distinct, key=lambda m: m.frequency.value))
 
     def _mode(self, section: int) -> Mode | None:
         """δω/ω = -δ(log a)/2, δζ/ζ = δ(log b) - δ(log a)/2. None for two real roots."""
@@ -101,35 +114,20 @@ class Rational:
         return Mode("antiresonance" if section < self.zeros else "resonance", frequency, own)
 
 
-def _product(parameters: Array, s: Complex, zeros: int) -> tuple[Complex, Complex]:
-    """H at s in units of the fit (bins,), and each 1 + b s + a s² (sections, bins)."""
-    b, a = np.exp(parameters[2::2, None]), np.exp(parameters[3::2, None])
-    sections = 1.0 + b * s + a * s**2
-    value = np.exp(parameters[0] - s * parameters[1]) * np.prod(sections[:zeros], axis=0)
-    return np.asarray(value / np.prod(sections[zeros:], axis=0)), np.asarray(sections)
-
-
-def _cancelled(modes: Sequence[Mode]) -> set[int]:
-    """Places of the modes that one of the other kind takes away, the nearest first, each once."""
-    gone: set[int] = set()
-    near = sorted(
-        (_apart(m, o), i, k)
-        for i, m in enumerate(modes)
-        for k, o in enumerate(modes[:i])
-        if o.kind != m.kind
-    )
-    for apart, i, k in near:
-        if apart <= _CONFIG.cancels and not gone & {i, k}:
-            gone |= {i, k}
-    return gone
-
-
 def _apart(m: Mode, other: Mode) -> float:
     """Return the larger difference of frequency and damping, in standard deviations of it."""
     pairs = ((m.frequency, other.frequency), (m.damping, other.damping))
     return max(
         abs(x.value - y.value) / max(float(np.hypot(x.std, y.std)), 1e-300) for x, y in pairs
     )
+
+
+def _product(parameters: Array, s: Complex, zeros: int) -> tuple[Complex, Complex]:
+    """H at s in units of the fit (bins,), and each 1 + b s + a s² (sections, bins)."""
+    b, a = np.exp(parameters[2::2, None]), np.exp(parameters[3::2, None])
+    sections = 1.0 + b * s + a * s**2
+    value = np.exp(parameters[0] - s * parameters[1]) * np.prod(sections[:zeros], axis=0)
+    return np.asarray(value / np.prod(sections[zeros:], axis=0)), np.asarray(sections)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,16 +143,12 @@ class _Data:
     correlated: float  # neighbouring bins that carry one independent estimate
     freedom: float  # of the variance; infinite where it is known
 
-    @property
-    def independent(self) -> float:
-        """Bins that count."""
-        return len(self.s) / self.correlated
-
 
 def fit_rational(
     frequency: Array,
     response: Complex,
     variance: Array,
+    *,
     with_delay: bool = True,
     correlated: float = 1.0,
     freedom: float = np.inf,
@@ -172,60 +166,29 @@ def fit_rational(
     Raises:
         InputRejected: T08, fewer than 18 bins; D09, not one bin with a finite variance.
     """
-    data = _prepare(frequency, response, variance, with_delay, correlated, freedom)
-    current = best = _rigid(data)
-    waited = 0
-    for order in range(1, _CONFIG.most + 1):
-        if 2 + 4 * order > data.independent:
-            break
-        square, fewer = _grow(data, current, True), _grow(data, current, False)
-        current = square
-        better = min((square, fewer, best), key=lambda one: one.description)
-        waited = 0 if better is not best else waited + 1
-        best = better
-        if waited >= _CONFIG.patience:
-            break
-    return best
-
-
-def scattered(model: Rational, frequency: Array, responses: Complex, variance: Array) -> Rational:
-    """Return the model with the covariance of its parameters from one of `responses` to the next.
-
-    Each of them (parts, bins) moves the parameters by one Gauss-Newton step from those of the fit;
-    `variance` (bins,) weighs the bins, as it did there.
-    """
-    data = _prepare(frequency, model.response(frequency), variance, True, 1.0, np.inf)
-    _, slope = _residual(data, model.parameters, model.zeros)
-    free = np.diag(model.covariance) > 0.0
-    own = np.ascontiguousarray(slope[free])
-    rest = (responses[:, np.isfinite(variance)] - data.target) * data.weight
-    steps = (np.conj(own) @ rest.T).real.T @ inverse(_normal(own, np.ones(len(data.s))))
-    covariance = np.zeros_like(model.covariance)
-    covariance[np.ix_(free, free)] = np.cov(steps.T)
-    return replace(model, covariance=covariance)
-
-
-def _prepare(
-    frequency: Array,
-    response: Complex,
-    variance: Array,
-    with_delay: bool,
-    correlated: float,
-    freedom: float,
-) -> _Data:
     good = np.isfinite(response) & np.isfinite(variance) & (frequency > 0.0) & (response != 0.0)
     if not good.any():
         remedy = "excite the frequencies that are asked for"
         raise InputRejected("D09", "no frequency at which the response is known", remedy=remedy)
     f, target = frequency[good], response[good]
     if len(f) < FEWEST:
-        remedy = "record longer, or ask for a finer resolution or a wider band"
+        remedy = "record longer, or excite a wider band"
         raise InputRejected("T08", f"{len(f)} frequencies are too few for a mode", remedy=remedy)
     spread = variance[good] + (_CONFIG.floor**2 + _CONFIG.exact) * np.abs(target) ** 2
     unit = float(2.0 * np.pi * np.sqrt(f[0] * f[-1]))
     s = np.asarray(2j * np.pi / unit * f, dtype=np.complex128)
     band, weight = (float(f[0]), float(f[-1])), np.sqrt(2.0 / spread)
-    return _Data(s, target, weight, unit, band, with_delay, correlated, freedom)
+    data = _Data(s, target, weight, unit, band, with_delay, correlated, freedom)
+    current = best = _rigid(data)
+    waited = 0
+    for order in range(1, _CONFIG.most + 1):
+        if 2 + 4 * order > len(f) / correlated or waited >= _CONFIG.patience:
+            break
+        current, fewer = _grow(data, current, True), _grow(data, current, False)
+        better = min(current, fewer, best, key=lambda one: one.description)
+        waited = 0 if better is not best else waited + 1
+        best = better
+    return best
 
 
 def _rigid(data: _Data) -> Rational:
@@ -246,18 +209,18 @@ def _rigid(data: _Data) -> Rational:
     return min(near, key=lambda one: one.description)
 
 
-def _residual(data: _Data, parameters: Array, zeros: int) -> tuple[Complex, Complex]:
+def _residual(data: _Data, p: Array, zeros: int) -> tuple[Complex, Complex]:
     """Residual (bins,) and Jacobian (parameters, bins), weighted.
 
     ∂H/∂log b = ± H b s / section, ∂H/∂log a = ± H a s² / section.
     """
-    value, sections = _product(parameters, data.s, zeros)
+    value, sections = _product(p, data.s, zeros)
     sign = np.where(np.arange(len(sections)) < zeros, 1.0, -1.0)[:, None]
-    slope = np.empty((len(parameters), len(data.s)), dtype=np.complex128)
+    slope = np.empty((len(p), len(data.s)), dtype=np.complex128)
     slope[0], slope[1] = value, -data.s * value if data.with_delay else 0.0
     shared = sign * value * data.s / sections
-    slope[2::2] = shared * np.exp(parameters[2::2, None])
-    slope[3::2] = shared * np.exp(parameters[3::2, None]) * data.s
+    slope[2::2] = shared * np.exp(p[2::2, None])
+    slope[3::2] = shared * np.exp(p[3::2, None]) * data.s
     return np.asarray((value - data.target) * data.weight), slope * data.weight
 
 
@@ -268,23 +231,22 @@ def _cost(rest: Complex, freedom: float) -> tuple[float, Array]:
     F-distributed, and the sum is Σ 2 (ν + 1) log(1 + u / ν), weights (ν + 1) / (ν + u); with ν = ∞
     it is Σ 2 u, weights 1.
     """
-    twice = rest.real**2 + rest.imag**2
+    u = 0.5 * (rest.real**2 + rest.imag**2)
     if not np.isfinite(freedom):
-        return float(twice.sum()), np.ones(len(rest))
-    u = 0.5 * twice
+        return float(2.0 * u.sum()), np.ones(len(rest))
     cost = float(2.0 * (freedom + 1.0) * np.log1p(u / freedom).sum())
     return cost, np.asarray((freedom + 1.0) / (freedom + u))
 
 
 def _refine(data: _Data, start: Rational) -> Rational:
     """Find the most likely parameters: by least squares, then with the variance's freedom."""
-    p = _descend(data, start, np.inf, *_CONFIG.fine)
+    found = _descend(data, start, np.inf, *_CONFIG.fine)
     if np.isfinite(data.freedom):
-        p = _descend(data, replace(start, parameters=p), data.freedom, *_CONFIG.fine)
-    return _judged(data, replace(start, parameters=p))
+        found = _descend(data, found, data.freedom, *_CONFIG.fine)
+    return _judged(data, found)
 
 
-def _descend(data: _Data, start: Rational, freedom: float, steps: int, stop: float) -> Array:
+def _descend(data: _Data, start: Rational, freedom: float, steps: int, stop: float) -> Rational:
     """Gauss-Newton steps, shortened until the cost decreases."""
     p, damping = start.parameters, 1e-3
     with np.errstate(all="ignore"):
@@ -305,20 +267,13 @@ def _descend(data: _Data, start: Rational, freedom: float, steps: int, stop: flo
                 damping *= 4.0
             if not before - cost > stop * before:
                 break
-    return p
+    return replace(start, parameters=p)
 
 
 def _normal(slope: Complex, w: Array) -> Array:
     """Re J W Jᴴ, of real and imaginary part side by side."""
     both = slope.view(np.float64)
     return np.asarray((both * np.repeat(w, 2)) @ both.T)
-
-
-def inverse(normal: Array, rank: float = 1e-14) -> Array:
-    """Return that of a symmetric matrix whose rows have different units."""
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    both = np.outer(scale, scale)
-    return np.asarray(np.linalg.pinv(normal / both, rcond=rank, hermitian=True) / both)
 
 
 def _judged(data: _Data, model: Rational) -> Rational:
@@ -337,9 +292,13 @@ def _judged(data: _Data, model: Rational) -> Rational:
     if not np.isfinite(normal).all():
         return model  # poles on a measured frequency, or beyond all numbers: no shorter description
     wider = data.correlated * max(misfit, 1.0) * (1.0 + 2.0 / data.freedom)
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    both = np.outer(scale, scale)
+    inverse = np.linalg.pinv(normal / both, rcond=_CONFIG.rank, hermitian=True) / both
     covariance = np.zeros((len(free), len(free)))
-    covariance[np.ix_(free, free)] = inverse(normal) * wider
-    description = cost / data.correlated + count * float(np.log(2.0 * data.independent))
+    covariance[np.ix_(free, free)] = inverse * wider
+    information = count * float(np.log(2.0 * len(data.s) / data.correlated))
+    description = cost / data.correlated + information
     return replace(model, covariance=covariance, misfit=misfit, description=description)
 
 
@@ -350,29 +309,28 @@ def _grow(data: _Data, model: Rational, with_zeros: bool) -> Rational:
     frequencies = np.abs(data.s[:: max(1, len(data.s) // _CONFIG.frequencies)])
     a = np.repeat(1.0 / frequencies**2, len(_CONFIG.dampings))
     b = (2.0 * np.array(_CONFIG.dampings) / frequencies[:, None]).ravel()
-    gain, zero, gained = _numerators(np.abs(data.s), weight, ratio, (a, b), with_zeros)
-    found, between = [], 2 + 2 * model.zeros
+    numerator, gained = _numerators(np.abs(data.s), weight, ratio, (a, b), with_zeros)
+    zeros, poles, between = model.zeros + int(with_zeros), model.poles + 1, 2 + 2 * model.zeros
+    found = []
     for k in _separate(gained, len(_CONFIG.dampings)):
-        pole = np.array([b[k], a[k]])
+        pole, (gain, *zero) = np.array([b[k], a[k]]), numerator[k]
         # a best numerator may be none that is passive
-        own = np.log(np.maximum(zero[k], _CONFIG.smallest * pole[: len(zero[k])]))
-        base = model.parameters[:2] + np.array([np.log(gain[k]), 0.0])
+        own = np.log(np.maximum(np.array(zero) / gain, _CONFIG.smallest * pole[: len(zero)]))
+        base = model.parameters[:2] + np.array([np.log(gain), 0.0])
         before, after = model.parameters[2:between], model.parameters[between:]
         p = np.concatenate([base, before, own, after, np.log(pole)])
-        zeros, poles = model.zeros + int(with_zeros), model.poles + 1
         started = replace(model, parameters=p, zeros=zeros, poles=poles)
-        p = _descend(data, started, np.inf, *_CONFIG.rough)
-        found.append(_judged(data, replace(started, parameters=p)))
+        found.append(_judged(data, _descend(data, started, np.inf, *_CONFIG.rough)))
     return _refine(data, min(found, key=lambda one: one.description))
 
 
 def _numerators(
     omega: Array, weight: Array, ratio: Complex, poles: tuple[Array, Array], with_zeros: bool
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array]:
     """min Σ weight |ratio - (c + d s + e s²) / (1 + b s + a s²)|² for every a, b; real c, d, e.
 
-    Without zeros c alone. At s = jω the normal equations of d stand apart from those of c and e.
-    Gives c, (d, e) / c, and what the sum loses; that is -1 where c is not positive.
+    At s = jω the normal equations of d are apart from those of c and e. Gives c, d, e (trials, 3),
+    without zeros c alone, and what the sum loses; c is 1 and that is -1 where c is not positive.
     """
     a, b = poles
     below = 1.0 / ((1.0 - a[:, None] * omega**2) + 1j * (b[:, None] * omega))  # (trials, bins)
@@ -381,16 +339,16 @@ def _numerators(
     seen = below * (weight * np.conj(ratio))
     right = np.stack([seen.real.sum(axis=1), -seen.imag @ omega, -seen.real @ omega**2], axis=1)
     if not with_zeros:
-        c = right[:, 0] / power[:, 0]
-        gained = np.where(c > 0.0, c * right[:, 0], -1.0)
-        return np.where(c > 0.0, c, 1.0), np.zeros((len(a), 0)), gained
+        right, found = right[:, :1], right[:, :1] / power[:, :1]
+        gained = np.where(found[:, 0] > 0.0, (found * right).sum(axis=1), -1.0)
+        return np.where(found > 0.0, found, 1.0), gained
     determinant = power[:, 0] * power[:, 2] - power[:, 1] ** 2
     c = (power[:, 2] * right[:, 0] + power[:, 1] * right[:, 2]) / determinant
     e = (power[:, 0] * right[:, 2] + power[:, 1] * right[:, 0]) / determinant
-    d = right[:, 1] / power[:, 1]
-    gained = c * right[:, 0] + d * right[:, 1] + e * right[:, 2]
-    safe = np.where(c > 0.0, c, 1.0)
-    return safe, np.stack([d, e], axis=1) / safe[:, None], np.where(c > 0.0, gained, -1.0)
+    found = np.stack([c, right[:, 1] / power[:, 1], e], axis=1)
+    gained = np.where(c > 0.0, (found * right).sum(axis=1), -1.0)
+    found[c <= 0.0, 0] = 1.0
+    return found, gained
 
 
 def _separate(gained: Array, dampings: int) -> list[int]:

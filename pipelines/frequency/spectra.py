@@ -5,7 +5,7 @@
     several = cross_spectra(stretches, rate, segment).responses(0, (1, 2))    v → (r, q)
     plant   = closed_loop(several, output=1, input=0)      P = G_vq / G_vr, without the controller
     plant   = indirect(several.of(0), controller)          P = (1 - S) / (C S), S = G_vr, eq. (29)
-    band    = excited_band(several, density)               where v tells anything of the plant
+    band    = excited_band(plants, density)                where v tells anything of the plant
 
 Equations (28), (29): Kostić et al. 2004. Variances: Pintelon, Schoukens 2012, System
 Identification, ch. 2 and 7. Spectra: Welch 1967, IEEE Trans. Audio 15, p. 70; Bendat, Piersol
@@ -23,12 +23,13 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected, UsageError
 from pipelines.frequency.config import BandConfig
 
-__all__ = ["Array", "Complex", "CrossSpectra", "ExcitedBand", "FrequencyResponse", "Responses"]
-__all__ += ["bands_below", "closed_loop", "cross_spectra", "excited_band", "indirect", "powered"]
+__all__ = ["Array", "Complex", "CrossSpectra", "FrequencyResponse", "Intervals", "Responses"]
+__all__ += ["bands_below", "closed_loop", "cross_spectra", "excited_band", "indirect", "inside"]
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 Mask = npt.NDArray[np.bool_]
+Intervals = tuple[tuple[float, float], ...]  # [Hz] (from, to), lowest first
 
 _AT_ONCE = 1 << 16  # numerics: values worked on at a time, so that they stay near the processor
 _HANN_OVERLAP = 1.0 / 18.0  # numerics: twice the squared correlation 1/6 of half overlapping parts
@@ -44,7 +45,6 @@ class FrequencyResponse:
     response: Complex  # [unit of output / unit of input] (bins,)
     variance: Array  # E|Ĝ - G|², real and imaginary part together (bins,)
     coherence: Array  # 0 … 1 (bins,); for a quotient the lower of its two
-    method: str  # "welch", "local polynomial", "multisine"
     resolution: float  # [Hz] width of what one estimate looks at
     averages: float  # independent averages in one estimate
     correlated: float  # neighbouring bins that carry one independent estimate, at least 1
@@ -73,26 +73,18 @@ class Responses:
     response: Complex  # (bins, outputs)
     covariance: Complex  # E (Ĝ - G)(Ĝ - G)ᴴ (bins, outputs, outputs)
     coherence: Array  # of the excitation with each output (bins, outputs)
-    method: str
     resolution: float  # [Hz]
     averages: float
     correlated: float
     freedom: float = np.inf
 
-    @property
-    def variance(self) -> Array:
-        """(bins, outputs)."""
-        return np.diagonal(self.covariance, axis1=1, axis2=2).real
-
     def of(self, output: int) -> FrequencyResponse:
         """Return the response of one output."""
-        spread = self.covariance[:, output, output].real
         return FrequencyResponse(
             self.frequency,
             self.response[:, output],
-            spread,
+            self.covariance[:, output, output].real,
             self.coherence[:, output],
-            self.method,
             self.resolution,
             self.averages,
             self.correlated,
@@ -149,7 +141,7 @@ class CrossSpectra:
         n = self.segments / (1.0 + _HANN_OVERLAP * (self.segments - 1) / self.segments)
         covariance = (own - explained) / ((n - 1.0) * power)[:, None, None]
         width = _HANN_WIDTH * float(self.frequency[1])
-        kind = ("welch", width, n, _HANN_BINS, n - 1.0)
+        kind = (width, n, _HANN_BINS, n - 1.0)
         return Responses(self.frequency[1:], response, covariance, coherence, *kind)
 
 
@@ -170,7 +162,8 @@ def cross_spectra(stretches: Sequence[Array], rate: float, segment: int) -> Cros
     if longest < segment:
         raise _too_short(f"the longest stretch has {longest} samples, one segment {segment}")
     if not all(np.isfinite(x).all() for x in stretches):
-        raise missing_samples("spectrum")
+        words = "missing samples in a signal whose spectrum is asked for"
+        raise InputRejected("D01", words, remedy="cut the log at its gaps")
     channels, count = stretches[0].shape[1], 0
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(segment) / segment)
     total = np.zeros((channels, channels, segment // 2 + 1), dtype=np.complex128)
@@ -205,37 +198,21 @@ def cross_spectra(stretches: Sequence[Array], rate: float, segment: int) -> Cros
 
 
 def _too_short(why: str) -> InputRejected:
-    return InputRejected("T08", why, remedy="record longer, or ask for a coarser resolution")
-
-
-def missing_samples(what: str) -> InputRejected:
-    """D01: a spectrum needs all of a signal."""
-    words = f"missing samples in a signal whose {what} is asked for"
-    return InputRejected("D01", words, remedy="cut the log at its gaps")
+    return InputRejected("T08", why, remedy="record longer")
 
 
 def closed_loop(responses: Responses, output: int = 1, input: int = 0) -> FrequencyResponse:
     """P = G_v,output / G_v,input (bins,): no controller, no bias by other drives of the loop.
 
-    P̂ - P ≈ (δ_out - P δ_in) / G_in; ibid., eq. (2-73). Where G_in is zero or unknown the response
-    is NaN, its variance infinite, its coherence 0.
+    P̂ - P ≈ (δ_out - P δ_in) / G_in; ibid., eq. (2-73).
     """
-    g_out, g_in = responses.response[:, output], responses.response[:, input]
-    c = responses.covariance
-    there = np.isfinite(g_in) & np.isfinite(g_out) & np.isfinite(c.real).all(axis=(1, 2))
-    there &= g_in != 0.0
-    safe, c = np.where(there, g_in, 1.0), np.where(there[:, None, None], c, 0.0)
-    plant = np.where(there, g_out, 0.0) / safe
-    spread = c[:, output, output].real + np.abs(plant) ** 2 * c[:, input, input].real
+    own, power = responses.of(output), np.abs(responses.response[:, input]) ** 2
+    plant, c = own.response / responses.response[:, input], responses.covariance
+    spread = own.variance + np.abs(plant) ** 2 * c[:, input, input].real
     spread -= 2.0 * (np.conj(plant) * c[:, output, input]).real
-    variance = np.where(there, np.maximum(spread, 0.0) / np.abs(safe) ** 2, np.inf)
-    lower = np.minimum(responses.coherence[:, output], responses.coherence[:, input])
-    return replace(
-        responses.of(output),
-        response=np.where(there, plant, np.nan),
-        variance=variance,
-        coherence=np.where(there, lower, 0.0),
-    )
+    lower = np.minimum(own.coherence, responses.coherence[:, input])
+    variance = np.maximum(spread, 0.0) / power
+    return replace(own, response=plant, variance=variance, coherence=lower)
 
 
 def indirect(sensitivity: FrequencyResponse, controller: Complex) -> FrequencyResponse:
@@ -244,42 +221,28 @@ def indirect(sensitivity: FrequencyResponse, controller: Complex) -> FrequencyRe
     C is that of the sampled controller: with the continuous one the error is 8.8 % at 28 Hz, 25 %
     at 80 Hz (1 kHz, kp = 400, kd = 28). |∂P/∂S| = 1 / |C S²|.
     """
-    there = np.isfinite(sensitivity.response) & (sensitivity.response != 0.0)
-    there &= controller != 0.0
-    s, c = np.where(there, sensitivity.response, 1.0), np.where(there, controller, 1.0)
-    return replace(
-        sensitivity,
-        response=np.where(there, (1.0 - s) / (c * s), np.nan),
-        variance=np.where(there, sensitivity.variance / np.abs(c * s**2) ** 2, np.inf),
-        coherence=np.where(there, sensitivity.coherence, 0.0),
-    )
+    s = sensitivity.response
+    variance = sensitivity.variance / np.abs(controller * s**2) ** 2
+    return replace(sensitivity, response=(1.0 - s) / (controller * s), variance=variance)
 
 
-def bands_below(
-    frequency: Array, coherence: Array, limit: float
-) -> tuple[tuple[float, float], ...]:
+def bands_below(frequency: Array, coherence: Array, limit: float) -> Intervals:
     """Return stretches [Hz] of bins whose coherence is under the limit, or unknown: (from, to)."""
     low = np.concatenate([[False], ~(coherence >= limit), [False]])
     first, end = np.flatnonzero(low[1:] != low[:-1]).reshape(-1, 2).T
     return tuple(zip(frequency[first].tolist(), frequency[end - 1].tolist(), strict=True))
 
 
-@dataclass(frozen=True)
-class ExcitedBand:
-    """Where responses exist, lowest interval first; none where the excitation says nothing."""
-
-    intervals: tuple[tuple[float, float], ...]  # [Hz]
-
-    def holds(self, frequency: Array) -> Mask:
-        """Return a mask of the `frequency` [Hz] (any shape) that lie in an interval."""
-        inside = np.zeros(np.shape(frequency), dtype=bool)
-        for low, high in self.intervals:
-            inside |= (frequency >= low) & (frequency <= high)
-        return inside
+def inside(intervals: Intervals, frequency: Array) -> Mask:
+    """Return a mask of the `frequency` [Hz] (any shape) that lie in one of the intervals."""
+    found = np.zeros(np.shape(frequency), dtype=bool)
+    for low, high in intervals:
+        found |= (frequency >= low) & (frequency <= high)
+    return found
 
 
-def excited_band(responses: Responses, density: Array) -> ExcitedBand:
-    """Find the intervals in which v has power and all its responses are known.
+def excited_band(responses: Sequence[FrequencyResponse], density: Array) -> Intervals:
+    """Find the intervals in which v has power and all its responses are known; none: nowhere.
 
     v is the instrument (Söderström, Stoica 1989, System Identification, ch. 8): P = G_vq / G_vu is
     unbiased in a loop as long as G_vu is well above its own noise. From ten decibels on the bias
@@ -289,25 +252,21 @@ def excited_band(responses: Responses, density: Array) -> ExcitedBand:
         responses: from v to input and output of the plant, by frequency.
         density: of v [unit²/Hz] at their frequencies (bins,).
     """
-    config, f = BandConfig(), responses.frequency
+    config, f = BandConfig(), responses[0].frequency
     if len(f) < config.fewest or not float(density.sum()) > 0.0:
-        return ExcitedBand(())
-    with np.errstate(all="ignore"):
-        ratio = np.abs(responses.response) ** 2 / responses.variance
-    known = np.nan_to_num(ratio, nan=0.0).min(axis=1)
+        return ()
+    power, variance = np.array(
+        [(np.abs(one.response) ** 2, one.variance) for one in responses]
+    ).swapaxes(0, 1)
+    known = (power / np.maximum(variance, config.exact * power + 1e-300)).min(axis=0)
     first = np.searchsorted(f, f * (1.0 - config.around))
     last = np.searchsorted(f, f * (1.0 + config.around), side="right")
     usual = np.array([np.median(known[a:b]) for a, b in zip(first, last, strict=True)])
-    good = np.flatnonzero(powered(density) & (usual >= config.known))
+    powered = density > config.power * float(density @ density) / density.sum()
+    good = np.flatnonzero(powered & (usual >= config.known))
     if not len(good):
-        return ExcitedBand(())
+        return ()
     times, share = config.hole
     widest = np.maximum(times * float(np.median(np.diff(f))), share * f[good[:-1]])
     parts = np.split(good, np.flatnonzero(np.diff(f[good]) > widest) + 1)
-    long = [p for p in parts if len(p) >= config.fewest]
-    return ExcitedBand(tuple((float(f[p[0]]), float(f[p[-1]])) for p in long))
-
-
-def powered(density: Array) -> Mask:
-    """Return a mask of the bins with power of v, by its `density` [unit²/Hz] (bins,), not all 0."""
-    return np.asarray(density > BandConfig().power * float(density @ density) / density.sum())
+    return tuple((float(f[p[0]]), float(f[p[-1]])) for p in parts if len(p) >= config.fewest)

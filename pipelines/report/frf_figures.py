@@ -1,4 +1,4 @@
-"""Figures of frequency responses: Fig. 17's Bode plots, the rigid body, compliance, friction."""
+"""Figures of frequency responses: Fig. 17's Bode plots, the rigid body, compliance."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 
 from pipelines.frequency.controller import double_integrator
 from pipelines.frequency.rational import Mode
-from pipelines.frequency.result import COHERENCE, Band, Curve, Method, Posture, same_bins
-from pipelines.frequency.spectra import Complex, ExcitedBand
+from pipelines.frequency.result import COHERENCE, Curve, Method, Posture, same_bins
+from pipelines.frequency.spectra import Complex, Intervals, inside
 from pipelines.report import style
 from pipelines.report.config import REPORT
-from pipelines.report.figures import Array, Look, joint_colour, one_figure
+from pipelines.report.figures import Array, Look, joint_colour
 from pipelines.report.report import Figure
 from pipelines.report.sentences import sentence
 
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 _CONFIDENCE = float(np.sqrt(-np.log(0.05)))  # [std] radius of the disc that holds it with 95 %
 _DECADE = 5.0  # numerics: values that span more are drawn on a logarithmic axis
-_HIGHEST = 2.5  # numerics: of the level of the rigid body: what lies beyond is noise
-_LOW = 10.0  # numerics: [Hz] up to which friction and reversal are shown
 _METHODS = {
     "direct": ("direct", style.ORANGE, 0.9, "-"),
     "indirect": ("indirect", style.GREEN, 1.6, (0, (4, 2))),
@@ -123,10 +121,10 @@ def _draw_confidence(size: Axes, phase: Axes, curve: Curve) -> None:
     size.set_ylim(0.3 * low, 2.0 * high)
 
 
-def outside(intervals: Sequence[Band], low: float, high: float) -> list[Band]:
+def outside(intervals: Intervals, low: float, high: float) -> Intervals:
     """Return the parts of `low` to `high` [Hz] outside all `intervals`."""
     edges = [low, *(edge for interval in intervals for edge in interval), high]
-    return [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > a]
+    return tuple((a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > a)
 
 
 def _unit_inertia(posture: Posture, method: Method) -> Complex:
@@ -152,9 +150,7 @@ def mark_modes(axes: Sequence[Axes], modes: Sequence[Mode]) -> None:
 
 def _good_points(curve: Curve, posture: Posture) -> tuple[Array, Complex]:
     """Frequencies and values that are coherent and in the excited band."""
-    good = (curve.coherence >= REPORT.coherent) & ExcitedBand(posture.excited).holds(
-        curve.frequency
-    )
+    good = (curve.coherence >= REPORT.coherent) & inside(posture.excited, curve.frequency)
     return curve.frequency[good], curve.value[good]
 
 
@@ -227,34 +223,3 @@ def compliance_figure(joint: int, postures: Sequence[Posture]) -> Figure:
         f"Joint {joint}: compliance and accelerance by torque. Dotted: the model's rigid body."
     )
     return Figure(f"compliance-{joint}", caption, draw, (6.4, 3.2))
-
-
-def friction_figure(joint: int, measured: Sequence[tuple[Posture, Mapping[str, Method]]]) -> Figure:
-    """Low frequencies: at constant speed, and of the whole log with its reversal."""
-
-    def draw(axis: Axes) -> None:
-        for k, (posture, methods) in enumerate(measured):
-            color, default = joint_colour(k), methods["closed-loop"]
-            draw_low(axis, posture.relative, color, posture_words(posture.posture, joint))
-            if (other := posture.with_reversal) is not None:
-                low = other.frequency <= _LOW
-                f, unit = other.frequency[low], np.abs(_unit_inertia(posture, default))
-                size = np.abs(other.value[low]) / np.interp(f, default.curve.frequency, unit)
-                axis.semilogx(f, size, color=color, linewidth=0.9, linestyle="--")
-            axis.axhline(posture.level.value, color=color, linewidth=0.7, linestyle=":")
-        axis.set_xlabel("frequency [Hz]")
-        axis.set_ylabel("acceleration per input")
-        axis.set_ylim(0.0, _HIGHEST * max(abs(p.level.value) for p, _ in measured))
-        axis.legend(loc="lower right", fontsize="small")
-        style.log_ticks(axis.xaxis)
-
-    return one_figure(f"friction-{joint}", sentence("frf", "friction", joint), draw, 2.8)
-
-
-def draw_low(axis: Axes, curve: Curve, color: str, label: str) -> None:
-    """The magnitude at low frequencies, with two standard deviations."""
-    low = curve.frequency <= _LOW
-    f, size, band = curve.frequency[low], np.abs(curve.value[low]), np.sqrt(2.0) * curve.std[low]
-    shade: Look = {"color": color, "alpha": 0.2, "linewidth": 0.0}
-    axis.fill_between(f, np.maximum(size - band, 0.0), size + band, **shade)
-    axis.semilogx(f, size, color=color, label=label)

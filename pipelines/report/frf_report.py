@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -15,7 +15,6 @@ from pipelines.report.config import REPORT
 from pipelines.report.frf_figures import (
     bode_figure,
     compliance_figure,
-    friction_figure,
     posture_words,
     relative_figure,
 )
@@ -33,7 +32,6 @@ _UNITS = {
     "inertia": "kg m²",
     "delay": "s",
 }
-_INPUT_UNITS = {"r": "rad/s²", "tau": "N m"}
 
 Responses = Mapping[str, Method]  # of one posture, method by method
 Measured = Sequence[tuple[Posture, Responses]]
@@ -144,17 +142,13 @@ def _grouping(sure: Sequence[Finding], unsure: Sequence[Open]) -> Section:
 
 def _modes(measured: Measured) -> Section:
     columns = ("joint", "posture", "kind", "frequency [Hz]", "damping ratio")
-    traces = "Traces: an antiresonance and a resonance that nearly cancel. Alone they name nothing."
-    tables = []
-    for which, caption in (("modes", "Value ± std."), ("traces", traces)):
-        rows = tuple(
-            (*_place(p), mode.kind, _known(mode.frequency), _known(mode.damping))
-            for p, own in measured
-            for mode in getattr(own["closed-loop"], which)
-        )
-        if rows:
-            tables.append(Table(columns, rows, caption))
-    return Section("Modes", _paragraphs("modes", bool(tables)), tuple(tables))
+    rows = tuple(
+        (*_place(p), mode.kind, _known(mode.frequency), _known(mode.damping))
+        for p, own in measured
+        for mode in own["closed-loop"].modes
+    )
+    tables = (Table(columns, rows, "Value ± std."),) if rows else ()
+    return Section("Modes", _paragraphs("modes", bool(rows)), tables)
 
 
 def _place(p: Posture) -> tuple[int, str]:
@@ -168,15 +162,8 @@ def _joint(joint: int, own: Measured, drawn: Sequence[int]) -> Section:
         bode_figure(joint, shown),
         relative_figure(joint, postures),
         compliance_figure(joint, postures),
-        friction_figure(joint, own),
     )
-    left = [
-        f"{format_number(p.friction_left, 2)} {_INPUT_UNITS[p.input]}"
-        for p in postures
-        if p.friction_left is not None
-    ]
-    low = max(p.friction_below for p in postures)
-    text = _paragraphs("joint", len(own), len(shown), left, low)
+    text = _paragraphs("joint", len(own), len(shown))
     return Section(f"Joint {joint}", text, figures=figures)
 
 
@@ -197,10 +184,7 @@ def _rigid(postures: Sequence[Posture]) -> Section:
         inertia = None if p.inertia is None else _known(p.inertia)
         delay = None if p.delay is None else with_std(1e3 * p.delay.value, 1e3 * p.delay.std)
         level = (p.expected_level, _known(p.level))
-        above = _known(p.level_above)
-        rows.append(
-            (*_place(p), *level, p.expected_inertia, inertia, above, delay, p.expected_from)
-        )
+        rows.append((*_place(p), *level, p.expected_inertia, inertia, delay, p.expected_from))
     columns = (
         "joint",
         "posture",
@@ -208,7 +192,6 @@ def _rigid(postures: Sequence[Posture]) -> Section:
         "measured",
         "inertia expected [kg m^2]",
         "measured [kg m^2]",
-        "level above all modes",
         "delay beside hold and controller [ms]",
         "expected from",
     )
@@ -238,10 +221,9 @@ def _three_methods(measured: Measured) -> Section:
         "coherence under 0.7 [Hz]",
     )
     caption = "Largest difference from the default where the method's own coherence is 0.7 or more."
-    tables = [Table(columns, tuple(rows), caption, tuple(tones))]
-    tables += _continuous(p for p, _ in measured)
+    table = Table(columns, tuple(rows), caption, tuple(tones))
     text, warning = _paragraphs("methods"), _say("biased", wrong)
-    return Section("Three methods", text, tuple(tables), warning=warning)
+    return Section("Three methods", text, (table,), warning=warning)
 
 
 def _bands(bands: Sequence[tuple[float, float]]) -> str:
@@ -254,22 +236,6 @@ def _bands(bands: Sequence[tuple[float, float]]) -> str:
     return f"{shown} and {more} more" if more > 0 else shown or "none"
 
 
-def _continuous(postures: Iterable[Posture]) -> list[Table]:
-    rows = []
-    for p in postures:
-        if p.continuous:
-            errors = [
-                f"{100.0 * p.continuous[f]:.3g} % at {f} Hz"
-                for f in sorted(p.continuous, key=float)
-            ]
-            rows.append((*_place(p), ", ".join(errors)))
-    columns = ("joint", "posture", "error of the indirect method with a continuous controller")
-    caption = (
-        "What k_p + k_d jω in the place of the sampled controller would have cost. It is not used."
-    )
-    return [Table(columns, tuple(rows), caption)] if rows else []
-
-
 def _recorded(measured: Measured) -> Section:
     motion, spectra = [], []
     numbers: dict[int, int] = {}
@@ -279,14 +245,9 @@ def _recorded(measured: Measured) -> Section:
         lost = (100.0 * p.left_out, 100.0 * p.filled)
         where = (p.joint, number)
         motion.append((*where, posture, ", ".join(p.logs), p.controller, p.speed, p.swing, *lost))
-        lines = (p.distortion, p.detected_even, p.detected_odd)
-        spectra.append((*where, _bands(p.excited), m.estimator, m.resolution, m.averages, *lines))
+        spectra.append((*where, _bands(p.excited), m.resolution, m.averages))
     settings = ("logs", "controller", "speed [rad/s]", "its std [rad/s]")
     motion_columns = ("joint", "no.", "posture", *settings, "left out [%]", "lost, filled [%]")
-    estimate = ("excited band [Hz]", "estimator", "resolution [Hz]", "averages")
-    spectra_columns = ("joint", "no.", *estimate, "realisations", "even lines", "odd lines")
-    tables = (
-        Table(motion_columns, tuple(motion)),
-        Table(spectra_columns, tuple(spectra), _say("spectra")),
-    )
+    spectra_columns = ("joint", "no.", "excited band [Hz]", "resolution [Hz]", "averages")
+    tables = (Table(motion_columns, tuple(motion)), Table(spectra_columns, tuple(spectra)))
     return Section("How it was measured", _paragraphs("recorded"), tables)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from scipy.signal import freqz
 
 from bench.control import Observer, observer_gain
 from pipelines.frequency.controller import (
-    continuous_controller,
     double_integrator,
     loop_delay,
     sampled_controller,
@@ -43,20 +41,6 @@ def test_observer_is_the_recursion_of_the_bench() -> None:
     found = sampled_controller(controller("observer", observer_gain=np.array([gain])), 1, FREQUENCY, T)
     assert found is not None
     np.testing.assert_allclose(found, truth, rtol=1e-6)
-
-
-@pytest.mark.parametrize(("hertz", "error"), [(5.0, 0.014), (28.0, 0.088), (80.0, 0.25), (200.0, 0.60)])
-def test_a_continuous_controller_would_be_wrong(hertz: float, error: float) -> None:
-    """(29) with kp + kd jω: 8.8 % at 28 Hz, 25 % at 80 Hz (kp = 400, kd = 28, 1 ms), and none with the sampled one."""
-    f = np.array([hertz])
-    plant = double_integrator(f, T)
-    sampled = sampled_controller(controller("backward-difference"), 1, f, T)
-    smooth = continuous_controller(controller("backward-difference"), 1, f)
-    assert sampled is not None
-    assert smooth is not None
-    s = 1.0 / (1.0 + plant * sampled)
-    assert abs((1.0 - s) / (sampled * s) / plant - 1.0) == pytest.approx(0.0, abs=1e-9)
-    assert float(abs((1.0 - s) / (smooth * s) / plant - 1.0)[0]) == pytest.approx(error, rel=0.05)
 
 
 def test_the_double_integrator_is_sampled_and_held() -> None:

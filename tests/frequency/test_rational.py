@@ -8,9 +8,8 @@ from scipy import signal
 
 from pipelines.errors import InputRejected
 from pipelines.frequency.controller import double_integrator
-from pipelines.frequency.local_polynomial import local_polynomial
-from pipelines.frequency.multisine import multisine_responses
 from pipelines.frequency.rational import Known, Rational, fit_rational
+from pipelines.frequency.responses import averaged_responses
 from pipelines.frequency.spectra import closed_loop
 from tests.frequency.loops import Plant, T, closed_loop_record
 
@@ -62,7 +61,6 @@ def test_four_modes_a_delay_and_two_plateaus_are_found() -> None:
         found = _fit(FREQUENCY, *_noisy(_truth(), 0.02, np.random.default_rng(seed)))
         modes = found.modes()
         assert [m.kind for m in modes] == [kind for kind, _, _ in known]
-        assert all(m.distinct for m in modes)
         for mode, (_, hertz, damping) in zip(modes, known, strict=True):
             deviations += [(mode.frequency.value - hertz) / mode.frequency.std, (mode.damping.value - damping) / mode.damping.std]
         high = 0.8 * (28.0 / 26.5) ** 2 * (85.0 / 60.0) ** 2
@@ -71,17 +69,6 @@ def test_four_modes_a_delay_and_two_plateaus_are_found() -> None:
         assert found.misfit == pytest.approx(1.0, abs=0.2)
     assert np.max(np.abs(deviations)) < 4.0
     assert np.mean(np.square(deviations)) == pytest.approx(1.0, abs=0.5)
-
-
-def test_the_flank_of_a_resonance_above_the_band_tells_where_it_is() -> None:
-    """An antiresonance at 75 Hz, a resonance at 210 Hz, seen up to 180 Hz with 2 % noise."""
-    w = 2.0 * np.pi * np.array([75.0, 210.0])
-    _, truth = signal.freqs([1.0 / w[0]**2, 0.06 / w[0], 1.0], [1.0 / w[1]**2, 0.2 / w[1], 1.0], 2.0 * np.pi * FREQUENCY)
-    found = fit_rational(FREQUENCY, *_noisy(np.asarray(truth), 0.02, np.random.default_rng(3)))
-    assert [m.kind for m in found.modes()] == ["antiresonance"]
-    _, above = found.modes(1.25)
-    assert above.kind == "resonance"
-    assert abs(above.frequency.value - 210.0) < 4.0 * above.frequency.std < 12.0
 
 
 @pytest.mark.parametrize("delay", [0.0, -5e-4, 4e-3])
@@ -104,7 +91,7 @@ def test_a_resonance_without_its_antiresonance() -> None:
     _, truth = signal.freqs([2.0], [1.0 / w**2, 0.04 / w, 1.0], 2.0 * np.pi * FREQUENCY)
     found = fit_rational(FREQUENCY, *_noisy(truth, 0.01, np.random.default_rng(1)), with_delay=False)
     mode, = found.modes()
-    assert (mode.kind, found.zeros, found.parameters[1]) == ("resonance", 0, 0.0)
+    assert (mode.kind, found.parameters[1]) == ("resonance", 0.0)
     assert mode.frequency.value == pytest.approx(70.0, rel=1e-3)
     assert mode.damping.value == pytest.approx(0.02, rel=0.05)
 
@@ -146,7 +133,7 @@ def _nearest(found: Rational, kind: str, hertz: float) -> tuple[float, float, fl
 
 
 def _campaign(seeds: range) -> tuple[np.ndarray, np.ndarray]:
-    """Relative errors and deviations (modes, 2) of machines with two modes in a loop, noise by local polynomials, multisines."""
+    """Relative errors and deviations (modes, 2) of machines with two modes in a loop, noise and multisines."""
     errors, deviations = [], []
     for seed in seeds:
         rng = np.random.default_rng(seed)
@@ -162,8 +149,7 @@ def _campaign(seeds: range) -> tuple[np.ndarray, np.ndarray]:
         d = 3.0 * drift / drift.std() + 2.0 * rng.standard_normal(samples)
         x = closed_loop_record(plant, v, d, 2e-6 * rng.standard_normal(samples), 400.0, 28.0)
         halves = (x[:samples // 2], x[samples // 2:])
-        several = multisine_responses(halves, 1.0 / T, period).noise if periodic else local_polynomial(
-            halves, 1.0 / T, np.arange(2.0, 200.0, 0.25))
+        several = averaged_responses(halves, 1.0 / T, *((2 * period, 2) if periodic else (samples // 5, 1)))
         p = closed_loop(several).within(2.0, 200.0)
         found = _fit(p.frequency, p.response, p.variance, double_integrator(p.frequency, T), correlated=p.correlated, freedom=p.freedom)
         truth = [("antiresonance", *z) for z in plant.antiresonances()] + [("resonance", f, z) for f, z, _ in plant.modes]

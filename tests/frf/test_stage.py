@@ -194,7 +194,7 @@ def test_what_v_does_not_excite_is_not_drawn(outcome: Outcome[frf.Result]) -> No
     assert x.size == direct.frequency.size
 
 
-@pytest.mark.parametrize("settings", [Settings(estimator="wavelet"), Settings(resolution=1e-4), Settings(low=90.0, high=20.0),
+@pytest.mark.parametrize("settings", [Settings(low=90.0, high=20.0),
                                       Settings(postures=(0,)), Settings(postures=(1, -4)), replace(QUICK, postures=(2,))])
 def test_settings_that_make_no_sense(settings: Settings) -> None:
     """C02, named."""
