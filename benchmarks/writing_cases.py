@@ -78,7 +78,7 @@ def identify(
 def missed(log: ExperimentLog, arm: Arm) -> Array:
     """Relative torque error of `arm` on `log`, joint by joint."""
     motion = reconstruct(log, Reconstruction())
-    return torque_validation(log, motion, arm, torques(arm, log, motion), False).relative_error
+    return torque_validation(log, motion, torques(arm, log, motion), False).relative_error
 
 
 def campaign(

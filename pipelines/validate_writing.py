@@ -180,7 +180,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     pairs, checks = _examined(sorted(judges, key=lambda log: log.experiment != "writing"))
     parts = [torques(arm, log, motion) for log, motion in pairs]
     found = tuple(
-        validation.torque_validation(log, motion, arm, own, place < CONFIG.drawn_logs)
+        validation.torque_validation(log, motion, own, place < CONFIG.drawn_logs)
         for place, ((log, motion), own) in enumerate(zip(pairs, parts, strict=True))
     )
     torque = validation.pooled(found)
@@ -431,7 +431,7 @@ def write(result: Result, folder: Path, request: Request) -> None:
 
 
 def report(result: Result) -> Report:
-    """Report the gates, the torque and its split, Table IV, the stretches, the simulation."""
+    """Report the gates, the torque and its split, Table IV, the simulation."""
     return writing_report(result)
 
 

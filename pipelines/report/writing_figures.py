@@ -21,7 +21,7 @@ from pipelines.report.figures import (
 )
 from pipelines.report.report import Figure
 from pipelines.report.sentences import sentence
-from pipelines.report.style import format_unit, printable
+from pipelines.report.style import format_unit
 from pipelines.report.words import each, joined
 from pipelines.simulation.course import Course as SimulatedCourse
 from pipelines.writing.control_cases import Case
@@ -72,49 +72,6 @@ def split_figure(found: TorqueValidation, course: Course, joints: Sequence[str])
         f"torque [{joined(found.torque_units)}]",
         legend=len(_PARTS),
     )
-
-
-def error_map_figure(found: TorqueValidation, joints: Sequence[str]) -> Figure | None:
-    """The path of the tip, darker where the model leaves more torque, one picture a joint."""
-    course = found.course
-    if course is None or found.split == "time":
-        return None
-    a, b = plane(course.tip)
-    every = max(1, -(-len(course.t) // _SEGMENTS))
-    residual = course.low_passed
-    filtered = "" if found.low_pass_hz is None else ", after the low-pass as in the text above"
-    points = course.tip[::every, [a, b]]
-
-    def draw(drawing: Drawing) -> None:
-        from matplotlib.collections import LineCollection
-
-        axes = joint_axes(drawing, len(joints))
-        lines = np.stack([points[:-1], points[1:]], axis=1)
-        for j, axis in enumerate(axes):
-            size = _largest_of(np.nan_to_num(np.abs(residual[:, j])), every)
-            top = float(size.max()) or 1.0  # the largest sample that the text names
-            path = LineCollection(list(lines), cmap="magma_r", linewidths=2.0)
-            path.set_array(size[: len(lines)])
-            path.set_clim(-0.15 * top, top)  # the lightest colour is no colour on white
-            axis.add_collection(path)
-            axis.set_xlim(points[:, 0].min() - 0.01, points[:, 0].max() + 0.01)
-            axis.set_ylim(points[:, 1].min() - 0.01, points[:, 1].max() + 0.01)
-            axis.set_aspect("equal")
-            axis.set_title(printable(joints[j], 60), pad=3.0)
-            axis.locator_params(axis="y", nbins=3)
-            axis.set_ylabel(f"{_AXES[b]} [m]")
-            bar = drawing.colorbar(path, ax=axis, pad=0.02)
-            bar.ax.set_ylim(0.0, top)
-            bar.set_label(f"|residual| [{found.torque_units[j]}]")
-        axes[-1].set_xlabel(f"{_AXES[a]} [m]")
-
-    caption = f"Where on its way the tip is when the model misses torque{filtered}."
-    return Figure(f"where-{found.name}", caption, draw, (6.0, 0.7 + 1.35 * len(joints)))
-
-
-def _largest_of(size: Array, every: int) -> Array:
-    """The largest of every so many samples: a peak of one sample would not be seen."""
-    return np.maximum.reduceat(size, np.arange(0, len(size), every))
 
 
 def executed_figure(cases: Sequence[Case]) -> Figure | None:

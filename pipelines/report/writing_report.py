@@ -13,10 +13,9 @@ from pipelines.report.figures import compared_figure
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
 from pipelines.report.sections import NO_COLLISION_CHECK
 from pipelines.report.sentences import capital, paragraphs, sentence
-from pipelines.report.style import format_decimals, format_number, format_unit, three_digits
+from pipelines.report.style import format_number, format_unit, three_digits
 from pipelines.report.words import each, joined
 from pipelines.report.writing_figures import (
-    error_map_figure,
     executed_figure,
     part_name,
     simulated_figures,
@@ -25,21 +24,19 @@ from pipelines.report.writing_figures import (
 )
 from pipelines.writing.control_cases import Case
 from pipelines.writing.task import Designed
-from pipelines.writing.validation import Result, TorqueValidation
+from pipelines.writing.validation import Result
 
-_MOST_ROWS = 40  # numerics: of the table of stretches
 _PARTS = ("inertia", "coriolis", "gravity", "friction", "effects")
 
 _say, _paragraphs = partial(sentence, "writing"), partial(paragraphs, "writing")
 
 
 def writing_report(result: Result) -> Report:
-    """Torque and where it is missed, Table IV, the simulation; or the task that was designed."""
+    """The torque, Table IV, the simulation; or the task that was designed."""
     if result.design is not None:
         return _task_report(result, result.design)
     sections = (
         _torque_section(result),
-        _where_section(result),
         _cases_section(result),
         _simulation_section(result),
     )
@@ -145,45 +142,6 @@ def _torque_figures(result: Result) -> tuple[Figure, ...]:
         (("friction", c.friction, style.GREEN), ("residual", c.residual, style.BLACK)),
     )
     return measured, split_figure(log, c, result.joints)
-
-
-def _where_section(result: Result) -> Section:
-    log = result.logs[0]
-    worst = [
-        {
-            "joint": result.joints[one.joint - 1],
-            "label": one.label,
-            "rms": one.rms,
-            "unit": log.torque_units[one.joint - 1],
-            "size": abs(one.error),
-            "t": one.t,
-            "end": _at_the_edge(log, one.t),
-            "tip": ", ".join(format_decimals(x, 3) for x in one.tip),
-        }
-        for one in log.largest
-    ]
-    rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (one.label, one.start, one.end, *(three_digits(100 * x) for x in one.relative_error))
-        for one in log.stretches[:_MOST_ROWS]
-    )
-    heads = ("where", "from [s]", "to [s]", *(f"{name} [%]" for name in result.joints))
-    caption = "What the model leaves in each, rms, over the torque of the whole log."
-    table = Table(heads, rows, caption, keeps_empty=True)
-    figure = error_map_figure(log, result.joints)
-    figures = () if figure is None else (figure,)
-    return Section(
-        "Where the torque is missed", _paragraphs("where", log, worst), (table,), figures
-    )
-
-
-def _at_the_edge(log: TorqueValidation, t: float) -> str:
-    """Return the end of the log that `t` [s] is within one low-pass period of; "" for neither."""
-    if log.low_pass_hz is None or not log.stretches:
-        return ""
-    near = 1.0 / log.low_pass_hz
-    if t - log.stretches[0].start < near:
-        return "beginning"
-    return "end" if log.stretches[-1].end - t < near else ""
 
 
 def _cases_section(result: Result) -> Section:

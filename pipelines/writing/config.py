@@ -20,11 +20,6 @@ class WritingConfig:
     same_reference: float = 1e-6  # [rad] by which references of one task differ: rounding
     most_draws: int = 1000  # of models on which cases are simulated
     shared: float = 0.9  # of the longer log: recorders start and stop by hand, while the arm rests
-    # where the torque is missed
-    still: float = 0.01  # of the largest speed of the tip, below which it stands still
-    briefest: float = 0.05  # [s] of a stretch between two standstills
-    most_stretches: int = 60  # between standstills; more of them name nothing
-    stretches: int = 10  # of equal time, without a reference that stops
     # figures
     points: int = 3000  # of a curve
     track_points: int = 2000  # of a path of the tip

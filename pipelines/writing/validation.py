@@ -1,8 +1,7 @@
 """Validate a model on held-out logs: torque, control cases, simulation.
 
-    found = torque_validation(log, motion, arm, parts)
+    found = torque_validation(log, motion, parts)
     found.relative_error            ‖τ - τ̂‖/‖τ‖, joint by joint
-    found.stretches                 the same, from one standstill of the tip to the next
 
 Kostić et al. 2004, Section IV.C.5, Figs. 13 and 14: the torque that the controller commanded
 against the torque of the model on the realised motion.
@@ -12,13 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from pipelines.dynamics.arm import Arm, ArmTorque
-from pipelines.dynamics.kinematics import serial_chain, tip_position
 from pipelines.errors import Check, RrridError
 from pipelines.estimation.filters import zero_phase
 from pipelines.estimation.motion import Reconstructed
@@ -45,9 +42,7 @@ from pipelines.writing.task import Designed
 __all__ = [
     "Course",
     "Gates",
-    "Largest",
     "Result",
-    "Stretch",
     "TorqueError",
     "TorqueValidation",
     "control_cases",
@@ -58,32 +53,7 @@ __all__ = [
     "torque_validation",
 ]
 
-Mask = npt.NDArray[np.bool_]
-
 PARTS = ("inertia", "coriolis", "gravity", "friction", "effects")
-
-
-@dataclass(frozen=True)
-class Stretch:
-    """A stretch of a log and the model's error in it."""
-
-    label: str
-    start: float  # [s] since the log began
-    end: float
-    rms: tuple[float, ...]  # [N m] of the residual, per joint
-    relative_error: tuple[float, ...]  # over the torque of the whole log: stretches compare
-
-
-@dataclass(frozen=True)
-class Largest:
-    """Where the model of one joint's torque is worst, after the low-pass."""
-
-    joint: int  # counted from 1
-    label: str  # the stretch with the largest rms
-    rms: float  # [N m] in it
-    t: float  # [s] of its largest sample
-    error: float  # [N m] there
-    tip: tuple[float, ...]  # [m] there
 
 
 @dataclass(frozen=True)
@@ -99,8 +69,6 @@ class Course:
     friction: Array
     effects: Array
     residual: Array  # measured - model
-    tip: Array  # [m] (points, 3) as executed
-    low_passed: Array  # the residual as `Largest` judges it; NaN where it does not
 
 
 @dataclass(frozen=True)
@@ -119,9 +87,6 @@ class TorqueValidation:
     low_pass_hz: float | None
     relative_error_low_pass: Array  # after one low-pass over both: without noise of the command
     parts_rms: dict[str, Array]  # [N m] of inertia, coriolis, gravity, friction, effects
-    split: str  # "standstills" | "time": what divides the stretches
-    stretches: tuple[Stretch, ...]
-    largest: tuple[Largest, ...]
     course: Course | None
 
 
@@ -142,97 +107,41 @@ def _low_passed(
 
 
 def torque_validation(
-    log: ExperimentLog, motion: Reconstructed, arm: Arm, parts: ArmTorque, draw: bool = True
+    log: ExperimentLog, motion: Reconstructed, parts: ArmTorque, draw: bool = True
 ) -> TorqueValidation:
-    """Compare the model's torque, `parts`, with the measured one; say where it is worst."""
+    """Compare the model's torque, `parts`, with the measured one."""
     known = _known(log, motion)
-    error, measured = (log.tau - parts.total)[known], log.tau[known]
+    error, measured = _rms((log.tau - parts.total)[known]), _rms(log.tau[known])
     smooth, cutoff = _low_passed(log, motion, log.tau - parts.total)
     whole = _rms(_low_passed(log, motion, log.tau)[0][known])
-    split, labels, at = stretches_of(log)
-    tip = tip_position(serial_chain(arm.robot), motion.motion.q)
-    judged = _inner(log, known, cutoff)
-    t, stretches = log.t - log.t[0], []
-    for k, label in enumerate(labels):
-        here = np.flatnonzero((at == k) & known)
-        if here.size:
-            rms = _rms(smooth[here])
-            stretches.append(
-                Stretch(
-                    label,
-                    float(t[here[0]]),
-                    float(t[here[-1]]),
-                    tuple(rms.tolist()),
-                    tuple(_ratio(rms, whole).tolist()),
-                )
-            )
-    worst = []
-    for j in range(log.n_joints):
-        size = np.where(judged, np.abs(smooth[:, j]), 0.0)
-        counts = np.maximum(np.bincount(at[judged], minlength=len(labels)), 1)
-        each = np.sqrt(np.bincount(at, size**2, minlength=len(labels)) / counts)
-        place = int(np.argmax(each))
-        k = int(np.argmax(np.where((at == place) & judged, size, -1.0)))
-        worst.append(
-            Largest(
-                j + 1,
-                labels[place],
-                float(each[place]),
-                float(t[k]),
-                float(smooth[k, j]),
-                tuple(tip[k].tolist()),
-            )
-        )
     course = None
     if draw:
         rows = slice(None, None, max(1, -(-log.n_samples // CONFIG.points)))
         shown, model = np.where(known[:, None], log.tau, np.nan)[rows], parts.total[rows]
-        course = Course(
-            t[rows],
-            shown,
-            model,
-            residual=shown - model,
-            tip=tip[rows],
-            low_passed=np.where(judged[:, None], smooth, np.nan)[rows],
-            **{name: getattr(parts, name)[rows] for name in PARTS},
-        )
+        each = {name: getattr(parts, name)[rows] for name in PARTS}
+        course = Course(log.t[rows] - log.t[0], shown, model, residual=shown - model, **each)
     return TorqueValidation(
         log.name,
         log.experiment,
         log.role,
         "unknown" if log.controller is None else log.controller.law,
         int(known.sum()),
-        tuple(joint_unit("tau", joint.revolute) for joint in log.robot.joints),
-        _rms(error),
-        _rms(measured),
-        _ratio(_rms(error), _rms(measured)),
+        tuple(joint_unit("tau", revolute) for revolute in log.robot.revolute),
+        error,
+        measured,
+        _ratio(error, measured),
         cutoff,
         _ratio(_rms(smooth[known]), whole),
         {name: _rms(getattr(parts, name)[known]) for name in PARTS},
-        split,
-        tuple(stretches),
-        tuple(worst),
         course,
     )
 
 
-def _known(log: ExperimentLog, motion: Reconstructed) -> Mask:
+def _known(log: ExperimentLog, motion: Reconstructed) -> npt.NDArray[np.bool_]:
     """Return (samples,) where torque and motion are measured and fit to be compared."""
-    good: Mask = np.zeros(log.n_samples, dtype=bool)
+    good = np.zeros(log.n_samples, dtype=bool)
     good[motion.good.kept] = motion.good.fit
     return np.asarray(good & np.isfinite(log.tau).all(axis=1))
-
-
-def _inner(log: ExperimentLog, known: Mask, cutoff: float | None) -> Mask:
-    """Return `known` without a period of the low-pass at both ends of the log, where not empty.
-
-    Nearer to an end a zero-phase filter and a smoother see one side only.
-    """
-    if cutoff is None or not known.any():
-        return known
-    t = log.t[known]
-    inner = known & (log.t - t[0] >= 1.0 / cutoff) & (t[-1] - log.t >= 1.0 / cutoff)
-    return inner if inner.any() else known
 
 
 def _rms(x: Array) -> Array:
@@ -242,28 +151,6 @@ def _rms(x: Array) -> Array:
 def _ratio(error: Array, whole: Array) -> Array:
     """Return ‖τ - τ̂‖/‖τ‖; infinite where a joint had no torque at all."""
     return np.divide(error, whole, out=np.full_like(error, np.inf), where=whole > 0.0)
-
-
-def stretches_of(log: ExperimentLog) -> tuple[str, tuple[str, ...], npt.NDArray[np.intp]]:
-    """Return what divides a log, the names of its stretches and that of each sample (samples,).
-
-    By the standstills of the tip's reference; without a reference that stops, by time.
-    """
-    if "q_ref" in log and np.isfinite(log["q_ref"]).all():
-        tip = tip_position(serial_chain(log.robot), log["q_ref"])
-        speed = np.linalg.norm(np.diff(tip, axis=0, append=tip[-1:]), axis=1)
-        still = np.concatenate([[True], speed <= CONFIG.still * speed.max()])
-        begins = np.flatnonzero(np.diff(still.astype(np.int8)) == -1)
-        long = np.diff(begins, append=len(tip)) * log.sample_time >= CONFIG.briefest
-        begins = begins[long]
-        if speed.max() > 0.0 and 1 < len(begins) <= CONFIG.most_stretches:
-            at = np.searchsorted(begins, np.arange(len(tip)), side="right") - 1
-            labels = tuple(f"stretch {k + 1}" for k in range(len(begins)))
-            return "standstills", labels, np.maximum(at, 0)
-    edges = np.linspace(0.0, log.n_samples, CONFIG.stretches + 1).astype(int)
-    ends = log.t[np.minimum(edges, log.n_samples - 1)] - log.t[0]
-    labels = tuple(f"{a:.1f} to {b:.1f} s" for a, b in pairwise(ends))
-    return "time", labels, np.repeat(np.arange(CONFIG.stretches), np.diff(edges))
 
 
 @dataclass(frozen=True)
@@ -363,35 +250,20 @@ def gates_of(
     )
     checks = []
     if torque is not None and gates.torque is False:
-        words = ", ".join(
+        missed = [
             f"joint {j + 1} {100 * error:.3g} %"
             for j, error in enumerate(torque.relative_error)
             if not error < limit
-        )
-        where = "see in which stretches; then " if torque.of == "writing" else ""
-        checks.append(
-            Check.of(
-                "D19",
-                "warn",
-                "the model misses the torque of held-out logs by more than "
-                f"{100 * limit:.3g} %: {words}",
-                where=robot,
-                gate=True,
-                remedy=f"{where}let 'rrrid diagnose' say what is missed, or fit to richer logs",
-            )
-        )
+        ]
+        words = f"the model misses the torque of held-out logs by more than {100 * limit:.3g} %: "
+        remedy = "let 'rrrid diagnose' say what is missed, or fit to richer logs"
+        words += ", ".join(missed)
+        checks.append(Check.of("D19", "warn", words, where=robot, gate=True, remedy=remedy))
     if gates.cases is False:
-        checks.append(
-            Check.of(
-                "D20",
-                "warn",
-                "with the complete model ahead of the feedback the tip strays no less "
-                "than without, on some axis",
-                where=robot,
-                gate=True,
-                remedy="look at the split of the torque, and at its signs",
-            )
-        )
+        words = "with the complete model ahead of the feedback the tip strays no less than "
+        words += "without, on some axis"
+        remedy = "look at the split of the torque, and at its signs"
+        checks.append(Check.of("D20", "warn", words, where=robot, gate=True, remedy=remedy))
     return gates, tuple(checks)
 
 

@@ -11,7 +11,7 @@ from pipelines.estimation.motion import Reconstructed, Reconstruction, reconstru
 from pipelines.estimation.result import torques
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.writing.task import writing_task
-from pipelines.writing.validation import TorqueValidation, stretches_of, torque_validation
+from pipelines.writing.validation import TorqueValidation, torque_validation
 from sample_logs.make_model import synthetic_arm
 from tests.healthy import AMPLIFIER, Path, make_log, with_signal
 
@@ -47,7 +47,7 @@ def motion(log: ExperimentLog) -> Reconstructed:
 
 
 def judged(log: ExperimentLog, motion: Reconstructed, arm: Arm) -> TorqueValidation:
-    return torque_validation(log, motion, arm, torques(arm, log, motion), False)
+    return torque_validation(log, motion, torques(arm, log, motion), False)
 
 
 def test_the_true_model_leaves_noise(log: ExperimentLog, motion: Reconstructed, arm: Arm) -> None:
@@ -64,19 +64,3 @@ def test_a_share_that_is_missed_is_that_share(log: ExperimentLog, motion: Recons
     weak = with_signal(log, tau=log.tau / 1.05)
     found = judged(weak, motion, arm)
     np.testing.assert_allclose(found.relative_error_low_pass, 0.05, rtol=0.05)
-
-
-@pytest.mark.parametrize(("joint", "stretch"), [(1, 1), (2, 4), (3, 7)])
-def test_what_is_missed_in_one_stretch_is_found_there(log: ExperimentLog, motion: Reconstructed, arm: Arm, joint: int,
-                                                      stretch: int) -> None:
-    """A bump of torque halfway from one standstill to the next: the stretch, the moment and the height are named."""
-    split, labels, at = stretches_of(log)
-    here = np.flatnonzero(at == stretch - 1)
-    middle = float(log.t[here[len(here) // 2]])
-    tau = log.tau.copy()
-    tau[:, joint - 1] += 0.8 * np.exp(-0.5 * ((log.t - middle) / 0.03)**2)
-    found = judged(with_signal(log, tau=tau), motion, arm)
-    worst = found.largest[joint - 1]
-    assert (found.split, worst.label) == (split, labels[stretch - 1]) == ("standstills", f"stretch {stretch}")
-    assert abs(worst.t - middle) < 0.01
-    assert worst.error == pytest.approx(0.8, rel=0.15)
