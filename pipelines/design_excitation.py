@@ -1,6 +1,6 @@
 """Design the experiment that tells most about the arm, within its limits.
 
-Reads    a robot description; optionally a model, earlier logs, results of frf, a recipe
+Reads    a robot description; optionally a model, earlier logs, a recipe
 Writes   trajectory.h5 (a planned log), controller.csv, coefficients.json, result.json, result.h5,
          report.html
 Source   Kostić et al. 2004, Section IV.C.3, eq. (22), Figs. 8 and 9; Swevers et al. 1997
@@ -11,18 +11,17 @@ Source   Kostić et al. 2004, Section IV.C.3, eq. (22), Figs. 8 and 9; Swevers e
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.named_cause import wanted_cause
-from pipelines.errors import NothingMatched, UsageError
+from pipelines.errors import UsageError
 from pipelines.excitation.discrimination import Pair, best, refuse_hidden, refuse_one
 from pipelines.excitation.optimise import Effort
 from pipelines.excitation.other_plans import frf_plans, friction_plans, hold_plans
-from pipelines.excitation.result import Result, doubts, first_mode, information_of, judged, planned
+from pipelines.excitation.result import Result, doubts, information_of, judged, planned
 from pipelines.excitation.result import log_of as planned_log_of
 from pipelines.excitation.task import Wishes, plan_task
 from pipelines.importers.controller import controller_table, write_controller_table
@@ -31,7 +30,7 @@ from pipelines.io.files import write_log
 from pipelines.io.model_file import read_model
 from pipelines.io.option import option
 from pipelines.io.output import write_file
-from pipelines.io.results import json_text, stored_result
+from pipelines.io.results import json_text
 from pipelines.io.robot import RobotDescription
 from pipelines.io.robot_files import load_robot, robot_at_hand, robot_sources
 from pipelines.io.sandbox import read_small_text
@@ -82,7 +81,6 @@ class Settings:
         None, "Box for the tip [m]: x from,to, y from,to, z from,to.")
     recipe: str | None = option(
         None, "Recipe of import: controller.csv in its order, units and rate.")
-    mode_factor: float = 3.0  # times that the top harmonic stays below the first mode
     discriminate: tuple[str, ...] = option(
         (), "Two causes that the motion shall separate: spring:2 cogging:2:order=1.", pair=True,
         causes=True)
@@ -94,7 +92,7 @@ class Settings:
         if not harmonics and self.discriminate:
             harmonics = APART_HARMONICS
         return Wishes(
-            self.criterion, self.cond_max, harmonics, self.frequency, bands, None, self.rest,
+            self.criterion, self.cond_max, harmonics, self.frequency, bands, self.rest,
             self.home, self.symmetric, self.friction, self.noise, self.torque_share,
             self.speed_share, self.tip_speed, self.tip_box, self.sample_time, self.periods)
 
@@ -106,13 +104,12 @@ class Material:
     robot: RobotDescription
     arm: Arm | None
     recipe: Recipe | None
-    modes: tuple[Mapping[str, Any], ...]  # results of frf
     tell: Any = field(compare=False)
     why: str = ""  # this robot, where none was named
 
 
 def read(request: Request, settings: Settings) -> Inputs:
-    """Read the robot, its model, the recipe, and earlier logs and results among the paths.
+    """Read the robot, its model, the recipe, and earlier logs.
 
     Raises:
         UsageError: C04, no such file; C02, a model of another robot.
@@ -130,15 +127,13 @@ def read(request: Request, settings: Settings) -> Inputs:
         path = find_recipe(settings.recipe)
         recipe = parse_recipe(read_small_text(path, what="a recipe (TOML)"), path)
         sources.append(path)
-    stored = (stored_result(path, "frf") for path in request.paths)
-    modes = tuple(found for found in stored if found is not None)
     logs = _earlier(request, settings, robot)
     if settings.model is not None and Path(settings.model).is_file():
         sources.append(Path(settings.model).absolute())
     sources = [*logs.sources, *(path.absolute() for path in sources)]
     return Inputs(logs.logs, logs.rejected, (*robot.checks, *logs.checks), tuple(sources),
                   logs.hashes, robot=robot, label=_label(settings), robot_name=robot.name,
-                  material=Material(robot, arm, recipe, modes, request.tell, why))
+                  material=Material(robot, arm, recipe, request.tell, why))
 
 
 def _label(settings: Settings) -> str:
@@ -160,16 +155,10 @@ def _arm(model: str | None, robot: RobotDescription) -> Arm | None:
 
 
 def _earlier(request: Request, settings: Settings, robot: RobotDescription) -> Inputs:
-    """Read the logs among the paths; a folder that holds none may hold a result of frf."""
-    paths = tuple(path for path in request.paths if path.name != "result.json")
-    if not paths:
+    """Read the logs among the paths."""
+    if not request.paths:
         return Inputs()
-    try:
-        found = read_logs(replace(request, paths=paths, robot=None), settings)
-    except NothingMatched:
-        if any(stored_result(path, "frf") is not None for path in paths):
-            return Inputs()
-        raise
+    found = read_logs(replace(request, robot=None), settings)
     for opened in found.logs:
         if opened.log.n_joints != robot.n_joints:
             raise UsageError("C02", f"{opened.path.name} has {opened.log.n_joints} joints, the "
@@ -187,8 +176,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     given: Material = inputs.material
     _refuse_strange(settings)
     pair = _pair(settings, given.robot)
-    mode = first_mode(given.modes)
-    wishes = replace(settings.wishes, top_hz=None if mode is None else mode / settings.mode_factor)
+    wishes = settings.wishes
     if settings.experiment != "excitation":
         return _plans(given, settings, wishes)
     logs = [opened.log for opened in inputs.logs if opened.log.origin != "planned"
@@ -211,7 +199,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     return replace(
         judged(task, design, apart, settings.seed), criterion=settings.criterion,
         robot_from=given.why, torque_share=settings.torque_share, speed_share=settings.speed_share,
-        after=tuple(log.name for log in logs), first_mode=mode, mode_factor=settings.mode_factor,
+        after=tuple(log.name for log in logs),
         logs=(("trajectory", log),), table=table)
 
 
@@ -236,8 +224,7 @@ def _refuse_strange(settings: Settings) -> None:
     positive = {"--time-limit": settings.time_limit, "--evaluations": settings.evaluations,
                 "--cond-max": settings.cond_max, "--periods": settings.periods,
                 "--tip-speed": settings.tip_speed, "sample_time": settings.sample_time,
-                "torque_share": settings.torque_share, "speed_share": settings.speed_share,
-                "mode_factor": settings.mode_factor}
+                "torque_share": settings.torque_share, "speed_share": settings.speed_share}
     for where, value in (*positive.items(), *(("noise", one) for one in settings.noise or ())):
         if value is not None and not 0.0 < value < math.inf:
             raise UsageError("C02", f"{value:g} is not positive and finite", where=where,

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
 from pipelines.dynamics import rrr
 from pipelines.dynamics.body import Array, Motion
-from pipelines.errors import Check, UsageError
+from pipelines.errors import Check
 from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.excitation.config import CONFIG
 from pipelines.excitation.discrimination import Apart
@@ -27,7 +25,7 @@ from pipelines.io.results import NOT_STORED
 from pipelines.writing.task import planned_log
 
 __all__ = ["Course", "DrawnPlan", "ParameterStd", "Result", "coefficients", "doubts",
-           "first_mode", "information_of", "judged", "log_of", "planned"]
+           "information_of", "judged", "log_of", "planned"]
 
 BLOCK = 4096  # numerics: samples whose rows are computed at once
 
@@ -110,8 +108,6 @@ class Result:
     torque_share: float = 1.0
     speed_share: float = 1.0  # of the speed limit that the plan may use
     after: tuple[str, ...] = ()
-    first_mode: float | None = None  # [Hz]
-    mode_factor: float = 1.0  # times that the top harmonic lies below it, at least
     top_hz: float = 0.0  # [Hz] of the highest harmonic
     robot_from: str = ""  # why this robot, where none was named
     apart: Apart | None = None  # of a design that tells two causes apart
@@ -232,21 +228,3 @@ def information_of(logs: Iterable[ExperimentLog], columns: ArmColumns) -> Array:
             block = np.ascontiguousarray(whole[:, :, first:first + BLOCK])
             total += grams_of(columns, block) * block.shape[2]
     return total
-
-
-def first_mode(results: Iterable[Mapping[str, Any]]) -> float | None:
-    """Return the lowest frequency [Hz] of a mode in results of `frf`; None where none was found.
-
-    Raises:
-        UsageError: C02, a result that does not hold what `frf` writes.
-    """
-    try:
-        values = [mode["frequency"]["value"] for result in results
-                  for response in result["responses"] for mode in response["modes"]]
-        found = [float(value) for value in values if value is not None]
-    except (KeyError, TypeError, ValueError):
-        found = [math.nan]
-    if not all(0.0 < value < math.inf for value in found):
-        raise UsageError("C02", "a result of frf does not say the frequencies of its modes",
-                         where="--prior-logs", remedy="run frf again, or leave its result out")
-    return min(found, default=None)

@@ -40,7 +40,6 @@ class Wishes:
     harmonics: tuple[int, ...] | None = None  # one, or one a joint
     frequency: tuple[float, ...] = (0.1,)  # [Hz] fundamental, one, or one a joint
     stop_band: tuple[tuple[float, float], ...] = ()  # [Hz] bands
-    top_hz: float | None = None  # no harmonic above
     rest: bool = True
     home: tuple[float, ...] | None = None  # [rad]
     symmetric: bool = False
@@ -157,20 +156,11 @@ def _harmonics(wishes: Wishes, joints: int, direct: bool) -> Harmonics:
     if not all(np.isfinite(f) and f > 0.0 for f in frequency):
         raise UsageError("C02", "a fundamental is not a positive number", where="--frequency",
                          remedy="give for example --frequency 0.1 [Hz]")
-    top, fewest = CONFIG.top_hz if direct else CONFIG.geared_top_hz, CONFIG.fewest_harmonics
-    most = [int(min(top, wishes.top_hz or top) / f + 1e-9) for f in frequency]
+    top = CONFIG.top_hz if direct else CONFIG.geared_top_hz
     if wishes.harmonics is not None:
         counts = [int(n) for n in _each(wishes.harmonics, joints, "--harmonics")]
     else:
-        counts = [max(fewest, n) for n in most]
-    if wishes.top_hz is not None:
-        counts = [min(n, int(wishes.top_hz / f + 1e-9))
-                  for n, f in zip(counts, frequency, strict=True)]
-        if min(counts) < fewest:
-            raise UsageError(
-                "C08", f"the first mode leaves {wishes.top_hz:.3g} Hz at most, a joint has fewer "
-                f"than {fewest} harmonics below", where="--prior-logs",
-                remedy="give a lower --frequency, or a smaller mode_factor")
+        counts = [max(CONFIG.fewest_harmonics, int(top / f + 1e-9)) for f in frequency]
     return plan_harmonics(frequency, counts, wishes.stop_band)
 
 

@@ -122,9 +122,6 @@ def _key_figures(result: Result) -> Table:
     ]
     if result.after:
         rows.append(("information added of", ", ".join(result.after[:6])))
-    if result.first_mode is not None:
-        name = f"first mode known; no harmonic above 1/{result.mode_factor:g} of it [Hz]"
-        rows.append((name, result.first_mode))
     return Table(("what", "figure"), tuple(rows))
 
 

@@ -1,27 +1,12 @@
-"""What is known before: modes, earlier logs, bounds on the parameters, or nothing of the links."""
+"""What is known before: earlier logs, bounds on the parameters, or nothing of the links."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
-import pytest
-
-from pipelines.io.results import headed
 from pipelines.io.robot_files import load_robot
 from tests.design_excitation.short import QUICK, designed
-
-
-def test_the_top_harmonic_stays_below_a_mode(tmp_path: Path) -> None:
-    """A mode at 4.5 Hz that `frf` has found: no harmonic above 1.5 Hz."""
-    modes = [{"frequency": {"value": 9.0}}, {"frequency": {"value": 4.5}}]
-    found = headed("frf", {"responses": [{"joint": 1, "modes": modes}]})
-    (tmp_path / "frf").mkdir()
-    (tmp_path / "frf" / "result.json").write_text(json.dumps(found))
-    out = designed(tmp_path / "out", replace(QUICK, harmonics=None), (tmp_path / "frf",)).folder
-    told = json.loads((out / "coefficients.json").read_text())
-    assert max(max(joint["harmonics"]) for joint in told["joints"]) / told["period"] == pytest.approx(1.5)
 
 
 def test_earlier_logs_count(tmp_path: Path, samples: Path) -> None:
