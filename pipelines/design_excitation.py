@@ -46,55 +46,23 @@ USED = ("excitation", "free")  # experiments whose information is added
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(Wishes):
     """Describe the experiment, its limits and the search."""
 
     robot: str | None = option(
         None, "Description, URDF, log or shipped name. [robot.toml here, else rrr]", "ROBOT")
     experiment: str = option("excitation", "excitation, friction, frf or hold.")
-    criterion: str = option(
-        "default", "default (A with condition 3), condition, D or A.")
-    cond_max: float | None = option(None, "Ceiling on the condition number. [default: 3]")
-    harmonics: tuple[int, ...] | None = option(None, "Harmonics: one number, or one a joint.")
-    frequency: tuple[float, ...] = option((0.1,), "Fundamental [Hz]: one, or one a joint.")
-    stop_band: tuple[float, ...] = option((), "Bands without harmonics [Hz]: 4,6 or 4,6,11,13.")
     time_limit: float = option(30.0, "Time to search, in seconds of computing.")
     evaluations: int | None = option(
         None, "Search so many evaluations instead: repeatable exactly.")
     seed: int = option(1, "Seed of the search.")
-    symmetric: bool = option(False, "Mirror-symmetric links: p4 = p15 = 0.")
     model: str | None = option(
         None, "Model that predicts torque and friction. [the described links]")
-    home: tuple[float, ...] | None = option(
-        None, "Posture to start from [rad], one a joint: 0,-1.57,0.")
-    rest: bool = option(True, "In motion at both ends, with run-in and run-out.", "--no-rest")
-    periods: int = option(1, "How often the period is repeated.")
-    sample_time: float = 1e-3  # [s]
-    friction: bool | None = option(
-        None, "Count columns of friction as well. [on every arm but the RRR arm]",
-        "--friction/--no-friction")
-    noise: tuple[float, ...] | None = None  # [N m] std of the torque; None: 1 % of its limit
-    torque_share: float = 0.9  # of the torque limit that the plan may use
-    speed_share: float = 0.95  # of the speed limit: a loop overshoots by up to 4 %
-    tip_speed: float | None = option(None, "Limit on the speed of the tip [m/s].")
-    tip_box: tuple[float, ...] | None = option(
-        None, "Box for the tip [m]: x from,to, y from,to, z from,to.")
     recipe: str | None = option(
         None, "Recipe of import: controller.csv in its order, units and rate.")
     discriminate: tuple[str, ...] = option(
         (), "Two causes that the motion shall separate: spring:2 cogging:2:order=1.", pair=True,
         causes=True)
-
-    @property
-    def wishes(self) -> Wishes:
-        bands = tuple(zip(self.stop_band[::2], self.stop_band[1::2], strict=False))
-        harmonics = self.harmonics
-        if not harmonics and self.discriminate:
-            harmonics = APART_HARMONICS
-        return Wishes(
-            self.criterion, self.cond_max, harmonics, self.frequency, bands, self.rest,
-            self.home, self.symmetric, self.friction, self.noise, self.torque_share,
-            self.speed_share, self.tip_speed, self.tip_box, self.sample_time, self.periods)
 
 
 @dataclass(frozen=True)
@@ -176,7 +144,9 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     given: Material = inputs.material
     _refuse_strange(settings)
     pair = _pair(settings, given.robot)
-    wishes = settings.wishes
+    wishes: Wishes = settings
+    if pair is not None and not settings.harmonics:
+        wishes = replace(settings, harmonics=APART_HARMONICS)
     if settings.experiment != "excitation":
         return _plans(given, settings, wishes)
     logs = [opened.log for opened in inputs.logs if opened.log.origin != "planned"

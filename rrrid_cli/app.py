@@ -59,7 +59,7 @@ class Inputs:
     folder: Path = option(Path(), "A folder that a command has left.", "DIR")
     what: str = option("model", "A command, for its result.json; model; log.", "WHAT")
     replay: tuple[Path, ...] = option((), "Log to replay, or a folder. Repeatable.")
-    prior_logs: tuple[Path, ...] = option((), "Earlier logs, or a result of frf. Repeatable.")
+    prior_logs: tuple[Path, ...] = option((), "Earlier logs. Repeatable.")
     identify: tuple[str, ...] = option((), "Identification logs, instead of the logs' own roles.")
     validate: tuple[str, ...] = option((), "Validation logs, instead of the logs' own roles.")
     reference: tuple[str, ...] = option((), "Logs of the arm as it was before.")

@@ -96,8 +96,6 @@ class Figures:
     """All criteria of one design."""
 
     condition_number: float  # of Φ
-    smallest_singular_value: float  # of Φ/√n
-    log_determinant: float  # log det M
     predicted_relative_std: float  # √(mean (std_k/size_k)²) of one experiment
 
 
@@ -165,12 +163,7 @@ class Goal:
         """Return all criteria, whichever is minimised."""
         plain, weighed = self._plain(grams), self._weighed(grams)
         variance = float(self._weights @ np.diag(weighed.covariance)) / self.samples
-        return Figures(plain.condition, math.sqrt(plain.values[0]),
-                       float(np.log(weighed.values).sum()), math.sqrt(variance))
-
-    def singular_values(self, grams: Array) -> Array:
-        """Return those of Φ/√n, largest first."""
-        return np.sqrt(self._plain(grams).values[::-1])
+        return Figures(plain.condition, math.sqrt(variance))
 
     def std(self, grams: Array) -> Array:
         """Return the standard deviation (columns,) of one experiment; NaN where not estimated."""

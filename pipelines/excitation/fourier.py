@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
 import numpy.typing as npt
@@ -29,7 +28,7 @@ __all__ = ["Harmonics", "MotionSpace", "Trajectory", "plan_harmonics", "quintics
 
 @dataclass(frozen=True, eq=False)
 class Harmonics:
-    """List the harmonics of the common period, joint by joint."""
+    """The harmonics of a period, joint by joint."""
 
     period: float  # [s]
     used: npt.NDArray[np.bool_]  # (joints, harmonics)
@@ -44,38 +43,26 @@ class Harmonics:
         return Harmonics(self.period, used) if used.sum(axis=1).min() > 1 else self
 
 
-def plan_harmonics(frequency: Sequence[float], count: Sequence[int],
-                   stop_band: Sequence[tuple[float, float]] = ()) -> Harmonics:
-    """Return `count` harmonics of `frequency` [Hz], one a joint, outside of the bands [Hz].
+def plan_harmonics(frequency: float, count: Sequence[int],
+                   stop_band: Sequence[float] = ()) -> Harmonics:
+    """Return `count` harmonics of `frequency` [Hz], one a joint, outside of bands from, to [Hz].
 
     Raises:
-        UsageError: C02, too many harmonics of the common period, or none outside the bands.
+        UsageError: C02, too many harmonics, or none outside the bands.
     """
-    if any(not math.isfinite(f) or f <= 0.0 for f in frequency) or any(n < 1 for n in count):
-        raise UsageError("C02", "a fundamental or a number of harmonics is not positive",
-                         where="--frequency, --harmonics",
-                         remedy="give for example --frequency 0.1 --harmonics 100")
-    exact = [Fraction(repr(float(f))).limit_denominator(10**6) for f in frequency]
-    denominator = math.lcm(*(f.denominator for f in exact))
-    base = Fraction(math.gcd(*(int(f * denominator) for f in exact)), denominator)
-    multiples = [int(f / base) for f in exact]
-    top = max(m * n for m, n in zip(multiples, count, strict=True))
-    if top > CONFIG.most_harmonics:
-        raise UsageError("C02", f"{top} harmonics of the common fundamental {float(base):g} Hz",
-                         where="--frequency, --harmonics", remedy="choose fundamentals that are "
-                         f"multiples of one another; {CONFIG.most_harmonics} harmonics at most")
-    used = np.zeros((len(exact), top), dtype=bool)
-    for row, m, n in zip(used, multiples, count, strict=True):
-        row[m - 1:m * n:m] = True
-    hertz = float(base) * np.arange(1, top + 1)
-    for low, high in stop_band:
-        used[:, (hertz >= low) & (hertz <= high)] = False
-    if not (used.sum(axis=1) >= CONFIG.fewest_harmonics).all():
-        what, where = ("the bands to stay out of leave", "--stop-band") if stop_band else (
-            "the number of harmonics leaves", "--harmonics")
-        raise UsageError("C02", f"{what} a joint fewer than two harmonics", where=where,
+    if not 0.0 < frequency < math.inf or not 1 <= min(count) <= max(count) <= CONFIG.most_harmonics:
+        raise UsageError("C02", f"{max(count)} harmonics of {frequency:g} Hz",
+                         where="--frequency, --harmonics", remedy="give for example --frequency "
+                         f"0.1 --harmonics 100; {CONFIG.most_harmonics} harmonics at most")
+    number = np.arange(1, max(count) + 1)
+    used = number <= np.array(count)[:, None]
+    for low, high in zip(stop_band[::2], stop_band[1::2], strict=True):
+        used[:, (frequency * number >= low) & (frequency * number <= high)] = False
+    if used.sum(axis=1).min() < CONFIG.fewest_harmonics:
+        raise UsageError("C02", "a joint has fewer than two harmonics",
+                         where="--harmonics, --stop-band",
                          remedy="give more harmonics, and narrow bands to stay out of")
-    return Harmonics(1.0 / float(base), used)
+    return Harmonics(1.0 / frequency, used)
 
 
 class MotionSpace:

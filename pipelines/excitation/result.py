@@ -43,15 +43,13 @@ class ParameterStd:
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """One period for figures, each (points, joints); and its spectrum."""
+    """One period for figures, each (points, joints)."""
 
     t: Array  # [s]
     q: Array  # [rad]
     dq: Array  # [rad/s]
     ddq: Array  # [rad/s^2]
     tau: Array | None  # [N m] of the model
-    hertz: Array  # (harmonics,)
-    amplitude: Array  # (harmonics, joints) [rad/s] of the speed
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +83,6 @@ class Result:
     condition_number: float | None = None
     lower_bound: float | None = None  # no motion of this arm can have a smaller one
     predicted_relative_std: float | None = None
-    smallest_singular_value: float | None = None
-    log_determinant: float | None = None
     limits: tuple[Peak, ...] = ()
     evaluations: int = 0
     found_at: int = 0
@@ -95,7 +91,6 @@ class Result:
     reached: bool = True
     shrunk: float = 1.0
     shrunk_for: tuple[str, ...] = ()  # the limits, in words, that asked for it
-    singular_values: tuple[float, ...] = ()  # of Φ/√n
     parameters: tuple[ParameterStd, ...] = ()
     course: Course | None = None
     period: float = 0.0  # [s]
@@ -169,7 +164,6 @@ def judged(task: Task, design: Design, apart: Apart | None, seed: int) -> Result
     q, dq, ddq = (part.T[rows] for part in motion)
     t = np.arange(samples, dtype=np.float64)[rows] * (series.period / samples)
     tau = None if task.arm is None else task.arm.torque(Motion(t, q, dq, ddq))
-    amplitude = np.hypot(series.cosine, series.sine).T
     bounded = rrr.fits(task.robot) and goal.earlier is None
     used = np.flatnonzero(task.harmonics.used.any(axis=0))
     return replace(
@@ -178,8 +172,7 @@ def judged(task: Task, design: Design, apart: Apart | None, seed: int) -> Result
         evaluations=design.evaluations, found_at=design.found_at, interrupted=design.stopped > 0,
         stopped=design.stopped, reached=goal.meets(figures.condition_number),
         shrunk=design.shrunk, shrunk_for=design.shrunk_for, parameters=parameters,
-        singular_values=tuple(goal.singular_values(grams).tolist()),
-        course=Course(t, q, dq, ddq, tau, series.omega / (2.0 * np.pi), amplitude),
+        course=Course(t, q, dq, ddq, tau),
         period=series.period, periods=trajectory.periods, run_in=trajectory.run_in,
         duration=trajectory.duration, noise=tuple(map(float, goal.noise)),
         friction_columns=columns.friction, top_hz=float(used[-1] + 1) / series.period,

@@ -23,6 +23,7 @@ from pipelines.excitation.fourier import Harmonics, plan_harmonics
 from pipelines.excitation.problem import ArmProblem
 from pipelines.excitation.regressor import ArmColumns, arm_columns
 from pipelines.excitation.verify import Peak, peaks
+from pipelines.io.option import option
 from pipelines.io.robot import RobotDescription
 
 __all__ = ["LOWER_BOUND", "Task", "Wishes", "plan_task"]
@@ -35,22 +36,26 @@ SYMMETRIC = ("p4", "p15")  # zero where the links are mirror symmetric (Section 
 class Wishes:
     """Collect the options of a design; None: the default of the arm."""
 
-    criterion: str = "default"
-    cond_max: float | None = None  # ceiling on the condition number; the default criterion's is 3
-    harmonics: tuple[int, ...] | None = None  # one, or one a joint
-    frequency: tuple[float, ...] = (0.1,)  # [Hz] fundamental, one, or one a joint
-    stop_band: tuple[tuple[float, float], ...] = ()  # [Hz] bands
-    rest: bool = True
-    home: tuple[float, ...] | None = None  # [rad]
-    symmetric: bool = False
-    friction: bool | None = None
-    noise: tuple[float, ...] | None = None  # [N m] standard deviation of the torque
-    torque_share: float = 0.9
-    speed_share: float = 0.95
-    tip_speed: float | None = None  # [m/s]
-    tip_box: tuple[float, ...] | None = None  # [m] x from, to, y from, to, z from, to
+    criterion: str = option("default", "default (A with condition 3), condition, D or A.")
+    cond_max: float | None = option(None, "Ceiling on the condition number. [default: 3]")
+    harmonics: tuple[int, ...] | None = option(None, "Harmonics: one number, or one a joint.")
+    frequency: float = option(0.1, "Fundamental [Hz].")
+    stop_band: tuple[float, ...] = option((), "Bands without harmonics [Hz]: 4,6 or 4,6,11,13.")
+    symmetric: bool = option(False, "Mirror-symmetric links: p4 = p15 = 0.")
+    home: tuple[float, ...] | None = option(
+        None, "Posture to start from [rad], one a joint: 0,-1.57,0.")
+    rest: bool = option(True, "In motion at both ends, with run-in and run-out.", "--no-rest")
+    periods: int = option(1, "How often the period is repeated.")
     sample_time: float = 1e-3  # [s]
-    periods: int = 1
+    friction: bool | None = option(
+        None, "Count columns of friction as well. [on every arm but the RRR arm]",
+        "--friction/--no-friction")
+    noise: tuple[float, ...] | None = None  # [N m] std of the torque; None: 1 % of its limit
+    torque_share: float = 0.9  # of the torque limit that the plan may use
+    speed_share: float = 0.95  # of the speed limit: a loop overshoots by up to 4 %
+    tip_speed: float | None = option(None, "Limit on the speed of the tip [m/s].")
+    tip_box: tuple[float, ...] | None = option(
+        None, "Box for the tip [m]: x from,to, y from,to, z from,to.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,16 +157,12 @@ def _box(numbers: tuple[float, ...]) -> Array:
 
 
 def _harmonics(wishes: Wishes, joints: int, direct: bool) -> Harmonics:
-    frequency = _each(wishes.frequency, joints, "--frequency")
-    if not all(np.isfinite(f) and f > 0.0 for f in frequency):
-        raise UsageError("C02", "a fundamental is not a positive number", where="--frequency",
-                         remedy="give for example --frequency 0.1 [Hz]")
     top = CONFIG.top_hz if direct else CONFIG.geared_top_hz
-    if wishes.harmonics is not None:
-        counts = [int(n) for n in _each(wishes.harmonics, joints, "--harmonics")]
-    else:
-        counts = [max(CONFIG.fewest_harmonics, int(top / f + 1e-9)) for f in frequency]
-    return plan_harmonics(frequency, counts, wishes.stop_band)
+    counts: tuple[float, ...] = wishes.harmonics or ()
+    if not counts and wishes.frequency > 0.0:
+        counts = (max(CONFIG.fewest_harmonics, int(top / wishes.frequency + 1e-9)),)
+    counts = _each(counts or (1,), joints, "--harmonics")
+    return plan_harmonics(wishes.frequency, [int(n) for n in counts], wishes.stop_band)
 
 
 def _each(values: Sequence[float], joints: int, where: str) -> tuple[float, ...]:

@@ -113,8 +113,6 @@ def _key_figures(result: Result) -> Table:
         predicted = 100 * (result.predicted_relative_std or math.nan)
         rows.append(("relative standard deviation, predicted [%]", predicted))
     rows += [
-        ("smallest singular value of Φ/√n", result.smallest_singular_value),
-        ("log det of the information matrix", result.log_determinant),
         ("duration", f"{duration} and twice {run_in}" if run_in else duration),
         ("highest harmonic [Hz]", result.top_hz),
         ("start and end", start),
@@ -162,9 +160,6 @@ def _motion(result: Result) -> Section | None:
         figures.append(
             _limited_figure(f"{quantity}s", caption, c.t, values, ends, label, result.joints)
         )
-    shown = c.amplitude.max(axis=1) > 1e-12
-    caption = "Which frequencies move each joint: amplitude of its speed."
-    figures.append(_spectrum_figure(caption, c.hertz[shown], c.amplitude[shown], result.joints))
     return Section("The motion", figures=tuple(figures))
 
 
@@ -202,7 +197,7 @@ def _shows(result: Result) -> Section:
     rows = tuple(
         (p.name, p.value, p.std, format_unit(p.unit), relative[p.name]) for p in result.parameters
     )
-    figures = [_singular_value_figure(result.singular_values)]
+    figures = []
     known = {name: x for name, x in relative.items() if x is not None}
     if known:
         figures.append(_relative_std_figure(list(known), list(known.values())))
@@ -286,38 +281,6 @@ def _limited_figure(
                 axis.axhline(end, color=style.VERMILLION, linewidth=0.9, linestyle=(0, (5, 2)))
 
     return rows_figure(name, caption, joints, draw_row, label)
-
-
-def _spectrum_figure(caption: str, hertz: Array, amplitude: Array, joints: Sequence[str]) -> Figure:
-    """Amplitude of the speed at every harmonic, one row a joint."""
-
-    def draw_row(axis: Axes, j: int) -> None:
-        axis.vlines(hertz, 0.0, amplitude[:, j], color=style.BLUE, linewidth=1.2)
-        axis.set_ylim(bottom=0.0)
-
-    label, x = "amplitude of the speed [rad/s]", "frequency [Hz]"
-    return rows_figure("spectrum", caption, joints, draw_row, label, x=x)
-
-
-def _singular_value_figure(values: Sequence[float]) -> Figure:
-    """Singular values of Φ, the largest first; which parameters they belong to the table says."""
-
-    def draw(axis: Axes) -> None:
-        place = np.arange(1, len(values) + 1)
-        wide = max(values) > _WIDE * min(values)
-        low = 0.5 * min(values) if wide else 0.0
-        axis.vlines(place, low, values, color=style.GREY, linewidth=1.0)
-        axis.plot(place, values, "o", color=style.BLUE, markersize=4.5)
-        if wide:
-            axis.set_yscale("log")
-            style.log_ticks(axis.yaxis)
-        axis.set_ylim(low, (2.0 if wide else 1.1) * max(values))
-        axis.set_xlabel("direction of the parameters")
-        axis.set_ylabel("singular value of Φ / √n")
-        axis.locator_params(axis="x", integer=True)
-
-    caption = "Singular values of Φ: the smallest belongs to the direction known worst."
-    return one_figure("singular-values", caption, draw, 2.8)
 
 
 def _relative_std_figure(names: Sequence[str], percent: Sequence[float]) -> Figure:

@@ -5,8 +5,7 @@ Kostić et al. 2004, eq. (22), with w_j = 2π j Δf and the index that the print
     q = q0 + Σ (a_j sin w_j t - b_j cos w_j t)/w_j
     q̇ = Σ (a_j cos w_j t + b_j sin w_j t),    q̈ = Σ w_j (b_j cos w_j t - a_j sin w_j t)
 
-All channels share one period. A channel with a fundamental of its own has amplitudes at multiples
-of it alone; the others are zero. The bounds hold between samples too. On M samples of a period
+All channels share one period. The bounds hold between samples too. On M samples of a period
 everything is one real Fourier transform.
 """
 

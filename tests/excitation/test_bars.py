@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.arm import Arm
-from pipelines.excitation.discrimination import Found
 from pipelines.excitation.optimise import Effort, design, landscape
 from pipelines.excitation.regressor import grams_of
 from pipelines.excitation.result import judged
@@ -25,7 +24,7 @@ def test_the_paper_s_problem() -> None:
     """100 harmonics, 13 parameters, limits of speed and acceleration: 1.30 at most in 9000 evaluations, some eight seconds of
     computing (median of three seeds), where the paper reached 3.1 and nothing is below 1.2247."""
     task = plan_task(rrr(), None, Wishes(criterion="condition", symmetric=True, rest=False, speed_share=1.0))
-    found = [judged(task, Found(design(task, Effort(evaluations=9000), seed)), seed).condition_number for seed in (1, 2, 3)]
+    found = [judged(task, design(task, Effort(evaluations=9000), seed), None, seed).condition_number for seed in (1, 2, 3)]
     assert min(found) >= np.sqrt(1.5)
     assert statistics.median(found) <= 1.30
 
@@ -37,7 +36,7 @@ def test_the_default_tells_more_than_the_smallest_condition_number() -> None:
         std = {}
         for criterion in ("default", "condition"):
             task = plan_task(rrr(), described(rrr()), Wishes(criterion=criterion))
-            one = judged(task, Found(design(task, Effort(evaluations=12000), seed)), seed)
+            one = judged(task, design(task, Effort(evaluations=12000), seed), None, seed)
             std[criterion] = one.predicted_relative_std
             if criterion == "default":
                 assert one.condition_number <= 3.0
@@ -54,5 +53,5 @@ def test_six_axes_beside_random_motions(shared: Path) -> None:
     for _ in range(50):
         motion = problem.space.motion(problem.start(rng, 0.999), problem.samples)
         random.append(task.problem.goal.figures(grams_of(columns, motion)).condition_number)
-    found = judged(task, Found(design(task, Effort(evaluations=6000), 1)), 1)
+    found = judged(task, design(task, Effort(evaluations=6000), 1), None, 1)
     assert found.condition_number <= statistics.median(random) / 5.0

@@ -26,7 +26,7 @@ def _problem(task: Task, samples: int = 24) -> DesignProblem:
 
 
 def _task(robot: RobotDescription, criterion: str, **wishes: object) -> Task:
-    given = Wishes(criterion=criterion, frequency=(0.5,), harmonics=(5,), **wishes)  # type: ignore[arg-type]
+    given = Wishes(criterion=criterion, frequency=0.5, harmonics=(5,), **wishes)  # type: ignore[arg-type]
     return plan_task(robot, described(robot) if criterion != "condition" else None, given)
 
 
@@ -72,7 +72,7 @@ def test_rows_are_the_regressor_s(robot: RobotDescription) -> None:
 
 def test_steps_stay_in_the_space() -> None:
     """Whatever is added along a gradient, the motion starts at rest at home and uses no forbidden harmonic."""
-    task = plan_task(rrr(), described(rrr()), replace(Wishes(), harmonics=(30,), stop_band=((1.0, 1.5),), home=(0.3, -1.2, 0.4)))
+    task = plan_task(rrr(), described(rrr()), replace(Wishes(), harmonics=(30,), stop_band=(1.0, 1.5), home=(0.3, -1.2, 0.4)))
     problem = _problem(task, 400)
     x = problem.start(np.random.default_rng(3))
     _, gradient, _ = problem.value(x, SHARP, WEIGHT)
