@@ -90,7 +90,7 @@ def test_found_is_exit_1_with_check_alone(lay: Lay) -> None:
 
 
 @pytest.mark.row("P02")
-@pytest.mark.parametrize("fault", ["full", "unreadable"])
+@pytest.mark.parametrize("fault", ["full", pytest.param("unreadable", marks=pytest.mark.slow)])
 def test_a_full_disk_stops_the_batch_and_it_can_go_on(lay: Lay, tmp_path: Path, fault: str) -> None:
     """P02: exit 6 at once, nothing partial, the summary says what is missing; --resume does the rest, to the same bytes."""
     items = {f"{i:02d}": "fine" for i in range(12)}

@@ -41,10 +41,10 @@ def test_links_are_passed_over_and_own_output_too(tmp_path: Path) -> None:
     assert [check.code for check in checks] == ["RRID-X11", "RRID-X11"]
 
 
-@pytest.mark.parametrize("of", [3])
+@pytest.mark.parametrize("of", [2])
 def test_shards_together_are_all_items(lay: Lay, tmp_path: Path, of: int) -> None:
     """None twice, none left out, and no shard has more than one item more than another."""
-    root = lay({f"{i:02d}": "fine" for i in range(5)})
+    root = lay({f"{i:02d}": "fine" for i in range(3)})
     shards = [statuses(obey(root, out=tmp_path / f"{number}", shard=(number, of))) for number in range(1, of + 1)]
-    assert sorted(name for one in shards for name in one) == [f"{i:02d}" for i in range(5)]
+    assert sorted(name for one in shards for name in one) == [f"{i:02d}" for i in range(3)]
     assert max(map(len, shards)) - min(map(len, shards)) <= 1

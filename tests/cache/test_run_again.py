@@ -139,7 +139,7 @@ def test_changed_code_and_libraries(small: Path, monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.row("P10")
-@pytest.mark.parametrize("file", [".cache/reconstruct/result.h5", ".cache/reconstruct/entry.json", "reconstruct/logs/1.h5"])
+@pytest.mark.parametrize("file", [".cache/reconstruct/entry.json", "reconstruct/logs/1.h5"])
 def test_a_damaged_store_is_computed_again(small: Path, file: str) -> None:
     """P10: one flipped byte is noticed, told, and mended by computing."""
     before = contents(small / "out", "provenance.json")

@@ -48,6 +48,7 @@ def test_a_fit_ends_at_the_same_numbers_wherever_it_starts(
     )
 
 
+@pytest.mark.slow
 def test_no_number_is_surer_than_it_moves_with_what_healthy_joints_have_in_small(
     found: Diagnosis,
 ) -> None:

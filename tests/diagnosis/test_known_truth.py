@@ -67,6 +67,7 @@ def humps(motion: Motion) -> Array:
     return np.array([2.0, 1.5, 0.7]) * np.exp(-(v / 0.1) ** 2) * np.tanh(SHARP * v)
 
 
+@pytest.mark.slow
 def test_a_law_that_all_joints_have_is_named_at_each_with_its_numbers() -> None:
     """No form of friction without a name, and no other law, takes its place."""
     found = diagnosed(*logs(humps), exclude=but("stribeck", "concave_friction", "quadratic_drag"))
@@ -83,6 +84,7 @@ def nameless(motion: Motion) -> Array:
     return out
 
 
+@pytest.mark.slow
 def test_what_is_surely_named_is_named_beside_a_larger_torque_without_a_name() -> None:
     found = diagnosed(*logs(nameless), exclude=but("cogging"))
     assert causes(found) == [("cogging", 2)]
