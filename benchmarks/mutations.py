@@ -112,20 +112,6 @@ def _healthy() -> Iterator[tuple[str, str]]:
         lines += [separator.join(map(str, (0.01 * k, *row))) for k, row in enumerate(rows)]
         yield "csv", "\n".join(lines) + "\n"
     yield "csv", "\n".join(",".join(map(str, row)) for row in rows) + "\n"
-    joints = [
-        f"{0.01 * k},joint_{j},{row[j]},{row[3 + j]}"
-        for k, row in enumerate(rows)
-        for j in range(3)
-    ]
-    yield "csv", "\n".join(["t,joint,position,effort", *joints]) + "\n"
-    spans = ["\ufeff;hip;;knee;", "Time;Angle;Torque;Angle;Torque", "[s];[deg];[Nm];[deg];[Nm]"]
-    yield (
-        "csv",
-        "\n".join(
-            [*spans, *(";".join(map(str, (0.01 * k, *row[:4]))) for k, row in enumerate(rows))]
-        )
-        + "\n",
-    )
     yield (
         "urdf",
         (
