@@ -12,7 +12,6 @@ that hour.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -20,20 +19,16 @@ from typing import Any
 import numpy as np
 
 from pipelines.dynamics.rrr import rigid_body
-from pipelines.errors import Check, Gathering, InputRejected, UsageError
+from pipelines.errors import Check, Gathering, UsageError
 from pipelines.estimation.grids import grid, resample
-from pipelines.importers.assemble import Map, Material, Source, assemble, collect, parse_map
+from pipelines.importers.assemble import Material, collect, parse_map
 from pipelines.importers.config import REPAIR
 from pipelines.importers.guess import Draft, guess_recipe
 from pipelines.importers.links import TorqueModel
-from pipelines.importers.make_log import ImportedTable, SourceFile, examine, import_table, make_log
+from pipelines.importers.make_log import ImportedTable, Made, SourceFile, import_table, logs_of
 from pipelines.importers.patterns import fill, unique
-from pipelines.importers.recipe import ResampleSpec
-from pipelines.importers.repair import Limits, Recording, late_intervals, repair
-from pipelines.importers.units import Converted, joint_side
-from pipelines.io import schema
 from pipelines.io.files import write_log
-from pipelines.io.log import ExperimentLog, Signal
+from pipelines.io.log import ExperimentLog
 from pipelines.io.option import option
 from pipelines.io.parquet import write_table
 from pipelines.io.results import NOT_STORED
@@ -145,17 +140,17 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     """
     material: Material = inputs.material
     mapped = parse_map(settings.map, material.recipe, material.robot.n_joints)
-    checks: list[Check] = list(material.robot.checks)
-    made: list[tuple[ExperimentLog, tuple[SourceFile, ...], Converted]] = []
-    problems = Gathering()
+    checks, made, problems = list(material.robot.checks), list[Made](), Gathering()
+    trust = settings.trust_units
     for source in material.sources:
         with problems.part():
-            made += _import(source, material, mapped, settings, checks)
+            made += logs_of(source, material, mapped, trust, (grid, resample), checks)
     problems.raise_all()
-    names = unique(log.name for log, *_ in made)
+    names = unique(item.log.name for item in made)
     paths = unique(slug(name) for name in names)
     logs: list[ImportedLog] = []
-    for (log, files, done), name, stem in zip(made, names, paths, strict=True):
+    for item, name, stem in zip(made, names, paths, strict=True):
+        log = item.log
         logs.append(
             ImportedLog(
                 name=name,
@@ -167,9 +162,9 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
                 joints=log.n_joints,
                 sample_time=log.sample_time,
                 duration=float(log.t[-1] - log.t[0]),
-                sources=files,
-                steps=tuple(done.steps),
-                altered=tuple(done.altered),
+                sources=item.files,
+                steps=tuple(item.done.steps),
+                altered=tuple(item.done.altered),
                 preview=_preview(log) if len(logs) < REPAIR.previews else None,
                 log=replace(log, name=name),
             )
@@ -182,89 +177,6 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     about_recipe = (material.recipe_path.name, material.robot.name)
     said = tuple(dict.fromkeys(checks))
     return Result(*about_recipe, tuple(logs), tuple(tables), material.ignored, said)
-
-
-def _import(
-    source: Source, material: Material, mapped: Map, settings: Settings, checks: list[Check]
-) -> list[tuple[ExperimentLog, tuple[SourceFile, ...], Converted]]:
-    """Return the logs of one recording, with files and treatment.
-
-    There are several where its clock was set back.
-    """
-    recipe, trust, missing = material.recipe, settings.trust_units, material.recipe.missing
-    limits = Limits(
-        missing=missing.values,
-        longest_gap=recipe.time.longest_gap,
-        resampled=recipe.resample is not None,
-        missing_rows=missing.rows,
-        held=recipe.log.torque == "held-command",
-    )
-    assembled = assemble(source, material, mapped, material.assume_units)
-    checks += assembled.checks
-    repaired = []
-    for recording in assembled.recordings:
-        parts, said = repair(recording, limits)
-        checks += said
-        repaired.append(parts)
-    if len(repaired) > 1 and any(len(parts) > 1 for parts in repaired):
-        message = "gaps or steps of the clock in files with clocks of their own"
-        remedy = "bring the files on one clock before the import"
-        raise InputRejected("T04", message, where=source.primary, remedy=remedy)
-    here = tuple(table.source for table in source.tables.values())
-    repairs = [c for c in checks if c.level == "repair" and c.where.startswith(here)]
-    made = []
-    for k, parts in enumerate(zip(*repaired, strict=True), start=1):
-        done = Converted([*assembled.undeclared], [f"{c.code}: {c.message}" for c in repairs])
-        sides = []
-        for part in parts:
-            side = joint_side(part, recipe, assembled.units, material.robot, material.drive, trust)
-            done.steps.extend(side.steps)
-            done.altered.extend(side.altered)
-            checks += side.checks
-            sides.append(side.signals)
-        _on_one_clock(parts, sides, recipe.resample, checks, done)
-        number = k if len(repaired[0]) > 1 else None
-        log, files = make_log(source, material, assembled, done, number)
-        checks += examine(log, source.primary, trust)
-        made.append((log, files, done))
-    return made
-
-
-def _on_one_clock(
-    parts: Sequence[Recording],
-    sides: Sequence[dict[str, Signal]],
-    spec: ResampleSpec | None,
-    checks: list[Check],
-    done: Converted,
-) -> None:
-    """Put the signals of a log in `done`, its time first; resampled where the recipe says so."""
-    about_t = schema.SIGNALS["t"][1]
-    if spec is None:
-        done.signals.update({"t": Signal(parts[0].t, "s", about_t), **sides[0]})
-        return
-    for part in parts:
-        recorded = 1.0 / float(np.median(np.diff(part.t)))
-        if recorded * REPAIR.finest < spec.rate:
-            message = f"resample.rate is {spec.rate:g} Hz, the recording has {recorded:.4g} Hz: "
-            message += "its samples would be invented"
-            remedy = "choose a rate near the recorded one, or a lower one"
-            raise UsageError("C02", message, where=part.where, remedy=remedy)
-    begin, end = max(float(p.t[0]) for p in parts), min(float(p.t[-1]) for p in parts)
-    at = grid(begin, end, spec.rate)
-    done.signals["t"] = Signal(at, "s", about_t)
-    method = "natural cubic spline" if spec.method == "spline" else "straight lines"
-    for part, side in zip(parts, sides, strict=True):
-        for name, signal in side.items():
-            values = resample(part.t, signal.values, at, spec.method)
-            done.signals[name] = replace(signal, values=values)
-        ms = 1e3 * np.diff(part.t)
-        words = f"resampled from {part.t.size} samples {ms.min():.4g} to {ms.max():.4g} ms apart "
-        words += f"(median {np.median(ms):.4g} ms) to {at.size} at {spec.rate:g} Hz, {method}"
-        if late := late_intervals(part).size:
-            words += f"; {many(late, 'interval')} of more than 1.5 times the median bridged"
-        remedy = "none needed for fits; record with an even clock where frequencies near the rate"
-        checks.append(part.check("T05", words, f"{remedy} matter", "warn"))
-        done.altered.append(words)
 
 
 def _preview(log: ExperimentLog) -> Preview:

@@ -18,7 +18,7 @@ from pipelines.errors import (
 )
 from pipelines.importers import patterns
 from pipelines.importers.clock import time_of
-from pipelines.importers.config import RECIPE
+from pipelines.importers.config import RECIPE, REPAIR
 from pipelines.importers.raw import RawTable, expand
 from pipelines.importers.recipe import FileSpec, Recipe, TableSpec, find_recipe, parse_recipe
 from pipelines.importers.repair import Recording
@@ -38,7 +38,7 @@ Map = Mapping[str, Mapping[int, str]]
 class Source:
     """One recording: the file that a pattern matched, and the files that go with it."""
 
-    case: FileSpec | None
+    case: FileSpec
     groups: Mapping[str, str]
     primary: str  # relative to the source folder
     tables: Mapping[str, RawTable]  # the same, of every file
@@ -89,18 +89,25 @@ def collect(
     cases = [*recipe.file, *([FileSpec(recipe.log.match)] if recipe.log.match else [])]
     every = [case.match for case in cases] + [spec.match for spec in recipe.table]
     fits = patterns.matches(every, names, path)
-    hits, sources, problems = _hits(recipe, cases, fits, names), [], Gathering()
-    companions = {file for name, (_, _, files) in hits.items() for file in files if file != name}
-    for name, (case, groups, files) in hits.items():
+    firsts = {n: next((k for k in range(len(cases)) if n in fits[k]), None) for n in names}
+    hits = {n: (cases[k], fits[k][n]) for n, k in firsts.items() if k is not None}
+    hits = {n: (case, groups) for n, (case, groups) in hits.items() if not case.skip}
+    files = {
+        n: dict.fromkeys([n, *(_file_of(recipe, s, groups, n) for s in recipe.signals)])
+        for n, (_, groups) in hits.items()
+    }
+    companions = {file for n, of_n in files.items() for file in of_n if file != n}
+    sources, problems = [], Gathering()
+    for name, (case, groups) in hits.items():
         if name in companions:
             continue
         with problems.part():
-            for other in (other for other in files if other not in names):
+            for other in (other for other in files[name] if other not in names):
                 message = f"'{other}' is missing, which belongs to '{name}'"
                 message += did_you_mean(other, names)
                 remedy = "copy it beside, or correct file = … in [signals]"
-                raise InputRejected("S01", message, where=path, remedy=remedy)
-            sources.append(Source(case, groups, name, {file: table_of(file) for file in files}))
+                raise InputRejected("S01", message, path, remedy)
+            sources.append(Source(case, groups, name, {f: table_of(f) for f in files[name]}))
     problems.raise_all()
     tables = tuple(
         (spec, fit[name], table_of(name))
@@ -117,7 +124,7 @@ def collect(
         message = f"no file matches {match}; {lie if there else 'no file lies there'}"
         remedy = "correct match in the recipe"
         remedy += "" if source else ", or give the folder of the recordings with --source"
-        raise NothingMatched("C06", message, where=folder, remedy=remedy)
+        raise NothingMatched("C06", message, folder, remedy)
     return Material(
         recipe,
         path,
@@ -132,23 +139,6 @@ def collect(
     )
 
 
-def _hits(
-    recipe: Recipe,
-    cases: list[FileSpec],
-    fits: list[dict[str, dict[str, str]]],
-    names: tuple[str, ...],
-) -> dict[str, tuple[FileSpec, dict[str, str], list[str]]]:
-    """Return the first case that each file fits, its groups, and the files of its signals."""
-    hits = {}
-    for name in names:
-        first = next((k for k in range(len(cases)) if name in fits[k]), None)
-        if first is not None and not cases[first].skip:
-            groups = fits[first][name]
-            files = [_file_of(recipe, signal, groups, name) for signal in recipe.signals]
-            hits[name] = cases[first], groups, list(dict.fromkeys([name, *files]))
-    return hits
-
-
 def _file_of(recipe: Recipe, signal: str, groups: Mapping[str, str], primary: str) -> str:
     template = recipe.signals[signal].file
     if template is None:
@@ -159,16 +149,14 @@ def _file_of(recipe: Recipe, signal: str, groups: Mapping[str, str], primary: st
 def _folder(recipe: Path, source: Path | None) -> Path:
     """Return the folder of the recordings: --source, or that of a recipe of one's own."""
     if source is None:
-        names = shipped_names("recipes")
-        if recipe.stem in names and recipe == shipped("recipes", recipe.stem):
+        if recipe.stem in shipped_names("recipes") and recipe == shipped("recipes", recipe.stem):
             message = f"the shipped recipe '{recipe.stem}' does not say where the recordings lie"
             remedy = "give their folder with --source FOLDER"
-            raise UsageError("C04", message, where="rrrid import", remedy=remedy)
+            raise UsageError("C04", message, "rrrid import", remedy)
         return recipe.parent
     if not source.is_dir():
         message = "is not a folder" if source.exists() else "no such folder"
-        remedy = "give the folder of the recordings with --source"
-        raise UsageError("C04", message, where=source, remedy=remedy)
+        raise UsageError("C04", message, source, "give the folder of the recordings with --source")
     return source
 
 
@@ -190,9 +178,8 @@ def _robot(
     for key in table:
         if key not in _BESIDE_USE:
             message = f"'robot.{key}' beside 'robot.use'{did_you_mean(key, _BESIDE_USE)}"
-            remedy = f"beside use, {', '.join(_BESIDE_USE)} can be given"
-            remedy += "; write the rest in the description"
-            raise UsageError("C01", message, where=path, remedy=remedy)
+            remedy = f"beside use, {', '.join(_BESIDE_USE)} can be given; write the rest in the "
+            raise UsageError("C01", message, path, f"{remedy}description")
     tip, gravity = table.get("tip_link"), table.get("gravity", [0.0, 0.0, 0.0])
     numbers = isinstance(gravity, list) and all(isinstance(g, int | float) for g in gravity)
     for key, value, right, what in (
@@ -202,8 +189,8 @@ def _robot(
          "three numbers [m/s^2]: gravity = [0.0, 0.0, -9.81]"),
     ):  # fmt: skip
         if not right:
-            message, remedy = f"'robot.{key}' is {value!r}, must be {what}", "correct the value"
-            raise UsageError("C02", message, where=path, remedy=remedy)
+            message = f"'robot.{key}' is {value!r}, must be {what}"
+            raise UsageError("C02", message, path, "correct the value")
     use, after_colon = split_tip(use)
     places = dict.fromkeys((folder, path.parent))
     found = next((place / use for place in places if (place / use).is_file()), None)
@@ -212,7 +199,7 @@ def _robot(
         lies = f"lies neither {nowhere}" if folder != path.parent else f"does not lie {nowhere}"
         message = f"the robot '{use}' that the recipe names {lies}"
         remedy = "copy it to the recordings, give their folder with --source, or another robot"
-        raise UsageError("C04", message, where=path, remedy=f"{remedy} with --robot")
+        raise UsageError("C04", message, path, f"{remedy} with --robot")
     robot = load_robot(found if found is not None else use, tip or after_colon)
     x, y, z = map(float, gravity if "gravity" in table else robot.gravity)
     robot = replace(robot, name=str(table.get("name", robot.name)), gravity=(x, y, z))
@@ -229,18 +216,15 @@ def parse_map(entries: tuple[str, ...], recipe: Recipe, joints: int) -> Map:
     for entry in entries:
         left, _, column = entry.partition("=")
         signal, _, joint = left.strip().rpartition("_")
-        if left.strip() == "t":
-            signal, joint = "t", "1"
-        elif not joint.isdecimal() or signal not in recipe.signals:
-            signal = ""
-        if not column.strip() or not signal:
-            known = ", ".join([*recipe.signals, "t"])
-            message = f"'{entry}' is not signal_joint=column"
-            remedy = f"write --map q_1=Joint_1; signals: {known}"
-            raise UsageError("C02", message, where="--map", remedy=remedy)
+        signal, joint = ("t", "1") if left.strip() == "t" else (signal, joint)
+        known = signal == "t" == left.strip() or (joint.isdecimal() and signal in recipe.signals)
+        if not column.strip() or not known:
+            signals = ", ".join([*recipe.signals, "t"])
+            remedy = f"write --map q_1=Joint_1; signals: {signals}"
+            raise UsageError("C02", f"'{entry}' is not signal_joint=column", "--map", remedy)
         if not 1 <= int(joint) <= joints:
             message = f"'{entry}' speaks of joint {joint}, the robot has joints 1 to {joints}"
-            raise UsageError("C02", message, where="--map", remedy="joints count from 1")
+            raise UsageError("C02", message, "--map", "joints count from 1")
         found.setdefault(signal, {})[int(joint)] = column.strip()
     return found
 
@@ -256,106 +240,94 @@ class Assembled:
     undeclared: tuple[str, ...] = ()  # units that the recipe leaves open and their source, in words
 
 
-def assemble(
-    source: Source, material: Material, mapped: Map, assume_units: bool = False
-) -> Assembled:
+def assemble(source: Source, material: Material, mapped: Map) -> Assembled:
     """Pick columns, units and time of every file of a recording, and join files of one clock.
 
     Raises:
         InputRejected: S01-S05, S08, S12, S16, T06.
     """
-    recipe = material.recipe
+    recipe, assume = material.recipe, material.assume_units
     time = replace(recipe.time, column=mapped["t"][1]) if "t" in mapped else recipe.time
     checks = [check for table in source.tables.values() for check in table.checks]
     units: dict[str, tuple[str, ...]] = {}
     columns: dict[str, tuple[str, ...]] = {}
-    recordings: list[Recording] = []
+    recordings: list[tuple[Recording, RawTable]] = []
     undeclared: list[str] = []
     problems = Gathering()
-    primary = source.primary
-    files = {s: _file_of(recipe, s, source.groups, primary) for s in recipe.signals}
     for file, table in source.tables.items():
-        here = [signal for signal in recipe.signals if files[signal] == file]
+        here = [s for s in recipe.signals
+                if _file_of(recipe, s, source.groups, source.primary) == file]  # fmt: skip
         for signal in here:
             with problems.part():
-                spec, instead = recipe.signals[signal], mapped.get(signal)
-                names = expand(table, spec.where or 1, material.robot.n_joints, signal, instead)
+                spec, robot = recipe.signals[signal], material.robot
+                names = expand(table, spec.where or 1, robot.n_joints, signal, mapped.get(signal))
                 columns[signal] = names
-                units[signal], said = unit_declared(
-                    signal, spec, table, names, material.robot, assume_units
-                )
+                units[signal], said = unit_declared(signal, spec, table, names, robot, assume)
                 checks += said
                 if spec.unit is None:
                     header = any(name in table.units for name in names)
                     origin = "from the header" if header else "assumed, as --assume-units says"
                     listed = ", ".join(dict.fromkeys(units[signal]))
                     undeclared.append(f"{signal}: unit {listed} {origin}")
-        if not here and file != primary:
-            continue
-        own = file == primary or all(
+        own = file == source.primary or all(
             isinstance(c, int) or c in table.columns for c, _ in time.parts
         )
-        clocked, t = own and time.column is not None, np.full(table.rows.size, np.nan)
+        t = np.full(table.rows.size, np.nan)
         with problems.part():
             if own:
                 if time.unit is None and len(time.parts) == 1:
                     of_t = table.units.get(table.name_of(time.parts[0][0], "t"))
                     undeclared += [f"t: unit {of_t} from the header"] if of_t else []
-                t, said = time_of(table, time, assume_units)
+                t, said = time_of(table, time, assume)
                 checks += said
-        if problems.found:
+        if problems.found or not (here or file == source.primary):
             continue
         x = {s: np.column_stack([table.columns[name] for name in columns[s]]) for s in here}
-        of_file = {s: columns[s] for s in here}
         si = {s: si_of(units[s], recipe.signals[s]) for s in here}
         places, word = (table.rows + 1, "row") if table.lines is None else (table.lines, "line")
+        clocked, of_file = own and time.column is not None, {s: columns[s] for s in here}
         part = Recording(t, x, of_file, places, table.source, clocked, word, table.breaks, si)
-        recordings.append(part)
+        recordings.append((part, table))
     problems.raise_all()
-    parts = _joined(recordings, list(source.tables.values()), time.column is not None, checks)
-    own_begin = source.case.begin if source.case is not None else None
-    begin = recipe.log.begin if own_begin is None else own_begin
-    parts = tuple(_begun(part, begin, checks) for part in parts) if begin else parts
+    parts = _joined(recordings, time.column is not None, checks)
+    begin = recipe.log.begin if source.case.begin is None else source.case.begin
+    if begin:
+        kept = [~(part.t < float(np.nanmin(part.t)) + begin) for part in parts]
+        for part, keep in zip(parts, kept, strict=True):
+            message = f"the first {begin:g} s, {int(np.sum(~keep))} samples, left out as the "
+            checks.append(Check.of("T04", "ok", f"{message}recipe says", part.where))
+        parts = tuple(part.take(keep) for part, keep in zip(parts, kept, strict=True))
     if len(parts) > 1 and recipe.resample is None:
         message, where = "the files have different time stamps", ", ".join(source.tables)
         remedy = "add [resample] rate = … to bring them on one clock"
-        raise InputRejected("T06", message, where=where, remedy=remedy)
+        raise InputRejected("T06", message, where, remedy)
     return Assembled(parts, units, columns, tuple(checks), tuple(undeclared))
 
 
-def _begun(part: Recording, begin: float, checks: list[Check]) -> Recording:
-    """Leave out what was recorded before `begin` [s], as the recipe asks."""
-    kept = ~(part.t < float(np.nanmin(part.t)) + begin)
-    message = f"the first {begin:g} s, {int(np.sum(~kept))} samples, left out as the recipe says"
-    checks.append(Check.of("T04", "ok", message, where=part.where))
-    return part.take(kept)
-
-
 def _joined(
-    recordings: list[Recording], tables: list[RawTable], clocked: bool, checks: list[Check]
+    recordings: list[tuple[Recording, RawTable]], clocked: bool, checks: list[Check]
 ) -> tuple[Recording, ...]:
     """Return one recording of files whose rows belong together; others keep their own clocks.
 
     Raises:
         InputRejected: S16, files without clocks of their own are not of one length.
     """
-    first, rows = recordings[0], tables[0].rows
-    separate: list[Recording] = []
-    for other, table in zip(recordings[1:], tables[1:], strict=True):
+    (first, of_first), *further = recordings
+    rows, separate = of_first.rows, list[Recording]()
+    for other, table in further:
         if clocked and other.clocked and not np.array_equal(other.t, first.t, equal_nan=True):
             separate.append(other)
             continue
         a, b = int(rows[-1]), int(table.rows[-1])
         where, counts = f"{first.where}, {other.where}", f"{a + 1} and {b + 1} samples"
-        few = max(1, 1e-3 * max(a, b))
+        few = max(1, REPAIR.lengths * max(a, b))
         if a != b and ((clocked and not other.clocked) or abs(a - b) > few):
-            remedy = "give files of the same run, or files with time stamps of their own and"
-            message = f"{counts}: not of one recording"
-            raise InputRejected("S16", message, where=where, remedy=f"{remedy} [resample]")
+            remedy = "give files of the same run, or with time stamps of their own and [resample]"
+            raise InputRejected("S16", f"{counts}: not of one recording", where, remedy)
         if a != b:
             message = f"{counts}; the rows both have are used, counted from the start"
             remedy = "begin and end both recordings together"
-            checks.append(Check.of("T06", "warn", message, where=where, remedy=remedy))
+            checks.append(Check.of("T06", "warn", message, where, remedy))
         rows, at, of = np.intersect1d(rows, table.rows, assume_unique=True, return_indices=True)
         signals = {name: values[at] for name, values in first.signals.items()}
         signals |= {name: values[of] for name, values in other.signals.items()}

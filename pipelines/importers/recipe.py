@@ -30,7 +30,7 @@ import datetime
 import json
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
 
@@ -41,7 +41,7 @@ from pipelines.io.robot import shipped
 from pipelines.io.sandbox import parse_toml
 
 Numbers = float | tuple[float, ...]  # one for all joints, or one a joint
-Columns = str | int | tuple[str | int, ...]
+Columns = str | int | tuple[str | int, ...]  # names, or numbers that count from 1
 Texts = str | tuple[str, ...]
 Experiment = Literal["friction", "excitation", "writing", "frf", "hold", "free"]
 Role = Literal["identify", "validate", "reference"]
@@ -92,11 +92,11 @@ class TimeSpec:
     """
 
     __pydantic_config__ = _STRICT
-    column: str | int | tuple[str | int, ...] | None = None
+    column: Columns | None = None
     unit: Texts | None = None  # s, ms, us, ns, 100 ns, min, d, or "sample" (needs rate)
     rate: float | None = None  # [Hz]
     sample_time: float | None = None  # [s]
-    longest_gap: float | None = None  # [s] ends a log, default 10 samples; resampling bridges more
+    longest_gap: float | None = None  # [s] ends a log, default 10 samples; resampling: more
 
     @property
     def parts(self) -> tuple[tuple[str | int, str | None], ...]:
@@ -135,7 +135,7 @@ class DriveSpec:
 
     __pydantic_config__ = _STRICT
     transmission: tuple[Numbers, ...] | None = None  # N as rows, or the gear ratios alone
-    torque_constant: Numbers | None = None  # [N m/A] motor side; needed where torque is a current
+    torque_constant: Numbers | None = None  # [N m/A] motor side, where torque is a current
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,6 @@ class MissingSpec:
 
     __pydantic_config__ = _STRICT
     values: tuple[float, ...] = ()
-    rows: tuple[float, ...] = ()  # only where all measured signals of a row have that number
 
 
 @dataclass(frozen=True)
@@ -162,10 +161,10 @@ class TextFormat:
 
     __pydantic_config__ = _STRICT
     delimiter: str | None = None
-    decimal: str | None = None  # "." or ","
+    decimal: Literal[".", ","] | None = None
     header: bool | None = None  # false: the first line is data already
     encoding: str | None = None
-    comment: str | None = None  # lines that start so are left out
+    comment: str | None = None  # begins a comment
 
 
 @dataclass(frozen=True)
@@ -230,9 +229,10 @@ _SECTIONS: dict[str, type] = {
     "controller": ControllerSpec, "table": TableSpec,
 }  # fmt: skip
 _DRAFT = "rrrid import --guess FILE drafts a recipe"
-# Numbers above zero.
 _POSITIVE = ("rate", "sample_time", "longest_gap", "counts_per_rev", "wrap", "period",
              "torque_constant")  # fmt: skip
+_REFERENCES = ("q_ref", "dq_ref", "ddq_ref")
+Problems = Iterator[tuple[str, str, str]]  # code, message, remedy; the first one is raised
 
 
 def find_recipe(source: str | Path) -> Path:
@@ -257,14 +257,15 @@ def parse_recipe(text: str, where: object = "") -> Recipe:
     except (ValueError, RecursionError) as problem:
         message = f"the recipe is not valid TOML: {problem}"
         remedy = "correct that line; strings need quotes, tables [ ]"
-        raise UsageError("C01", message, where=where, remedy=remedy) from None
+        raise UsageError("C01", message, where, remedy) from None
     if blanks := blanks_of(table):
         more = f" and at {', '.join(blanks[1:6])}" if len(blanks) > 1 else ""
         remedy = f"replace the blank marked {BLANK} at {blanks[0]}{more}; the draft says what"
         message = f"'{blanks[0]}' is still marked {BLANK}"
-        raise UsageError("C02", message, where=where, remedy=f"{remedy} belongs there")
+        raise UsageError("C02", message, where, f"{remedy} belongs there")
+    _bounds(table, where)
     if "where" in table:
-        raise UsageError("C01", "'where' is not a key of a recipe", where=where, remedy="remove it")
+        raise UsageError("C01", "'where' is not a key of a recipe", where, "remove it")
     try:
         # TOML's own dates become text, for the type check to complain of.
         recipe = TypeAdapter(Recipe).validate_json(json.dumps(table, default=str), strict=True)
@@ -276,13 +277,24 @@ def parse_recipe(text: str, where: object = "") -> Recipe:
         found.raise_all()
         raise  # never reached: there is an error at least
     except RecursionError:
-        message = "the recipe is nested too deeply"
-        raise UsageError("C02", message, where=where, remedy=_DRAFT) from None
-    for check in (_bounds, _format, _signals, _times):
+        raise UsageError("C02", "the recipe is nested too deeply", where, _DRAFT) from None
+    for check in (_format, _signals, _times):
         for code, message, remedy in check(recipe):
             kind = UsageError if code.startswith("C") else InputRejected
-            raise kind(code, message, where=where, remedy=remedy)
+            raise kind(code, message, where, remedy)
     return recipe
+
+
+def _leaves(value: object, path: str = "", key: str = "") -> Iterator[tuple[str, str, object]]:
+    """Yield (place, key, value) of all in a TOML table that is no table and no list."""
+    if isinstance(value, dict):
+        for name, inner in value.items():
+            yield from _leaves(inner, f"{path}.{name}".lstrip("."), str(name))
+    elif isinstance(value, list):
+        for i, inner in enumerate(value, start=1):
+            yield from _leaves(inner, f"{path}[{i}]", key)
+    else:
+        yield path, key, value
 
 
 def blanks_of(table: dict[str, Any]) -> list[str]:
@@ -290,18 +302,29 @@ def blanks_of(table: dict[str, Any]) -> list[str]:
     return [path for path, _, x in _leaves(table) if isinstance(x, str) and BLANK in x.upper()]
 
 
-def _leaves(value: object, path: str = "", key: str = "") -> Iterator[tuple[str, str, object]]:
-    """Yield (place, key, value) of all that is no table, list or section in the recipe."""
-    if is_dataclass(value):
-        value = {item.name: getattr(value, item.name) for item in fields(value)}
-    if isinstance(value, dict):
-        for name, inner in value.items():
-            yield from _leaves(inner, f"{path}.{name}".lstrip("."), str(name))
-    elif isinstance(value, list | tuple):
-        for i, inner in enumerate(value, start=1):
-            yield from _leaves(inner, f"{path}[{i}]", key)
-    else:
-        yield path, key, value
+def _bounds(table: dict[str, Any], where: object) -> None:
+    """C02: refuse a number that is not finite or out of its bounds."""
+    for path, key, value in _leaves(table):
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or path.startswith(("robot.", "missing.")):
+            continue
+        try:
+            x = float(value)  # type: ignore[arg-type]
+        except OverflowError:  # an integer of hundreds of digits
+            x = math.inf
+        said = ""
+        if not math.isfinite(x):
+            said, remedy = "must be a finite number", "correct the number"
+        elif abs(x) > RECIPE.largest:
+            said, remedy = f"must lie within ±{RECIPE.largest:g}", "correct it, or its unit"
+        elif key in _POSITIVE and x <= 0.0:
+            said, remedy = "must be above 0", "correct the number"
+        elif key == "sign" and abs(x) != 1.0:
+            said, remedy = "must be 1 or -1", "use scale for other factors"
+        elif key in ("joint", "column", "columns") and (x < 1 or x != int(x)):
+            said, remedy = "must be 1 or more", "joints and columns count from 1"
+        if said:
+            raise UsageError("C02", f"'{path}' is {x}, {said}", where, remedy)
 
 
 def _date(table: dict[str, Any], where: object) -> None:
@@ -313,20 +336,18 @@ def _date(table: dict[str, Any], where: object) -> None:
     cases = table["file"] if isinstance(table.get("file"), list) else []
     owners = [("log", table.get("log"))]
     owners += [(f"file[{i}]", case) for i, case in enumerate(cases, start=1)]
-    example = "write it with its offset from UTC, 2024-05-17T11:30:00+02:00, or with Z"
     for place, owner in owners:
         if not isinstance(owner, dict) or "recorded" not in owner:
             continue
         value = owner["recorded"]
-        problem = f"{value}: the offset from UTC is missing"
         try:
-            time = value if isinstance(value, datetime.datetime) else None
-            time = time or datetime.datetime.fromisoformat(str(value))
+            time = datetime.datetime.fromisoformat(str(value))
         except ValueError:
-            time, problem = None, f"'{value}', not a date and time of ISO 8601"
+            time = None
         if time is None or time.tzinfo is None:
-            message, remedy = f"'{place}.recorded' is {problem}", f"{example}, or leave it out"
-            raise UsageError("C02", message, where=where, remedy=remedy)
+            message = f"'{place}.recorded' is '{value}', no date and time with its offset from UTC"
+            remedy = "write 2024-05-17T11:30:00+02:00, or with Z; or leave it out"
+            raise UsageError("C02", message, where, remedy)
         owner["recorded"] = time.astimezone(datetime.UTC).isoformat().replace("+00:00", "Z")
 
 
@@ -345,57 +366,26 @@ def _explain(error: Any, where: object) -> UsageError:
         kind = ColumnSpec if "columns" in path[:-1] else _SECTIONS.get(str(path[0]), Recipe)
         known = [f.name for f in fields(Recipe if len(path) == 1 else kind) if f.name != "where"]
         message = f"'{place}' is not a key of a recipe{did_you_mean(str(path[-1]), known)}"
-        return UsageError("C01", message, where=where, remedy=f"known here: {', '.join(known)}")
+        return UsageError("C01", message, where, f"known here: {', '.join(known)}")
     if error["type"] in ("missing", "missing_argument"):
-        return UsageError("C02", f"'{place}' is missing", where=where, remedy=_DRAFT)
+        return UsageError("C02", f"'{place}' is missing", where, _DRAFT)
     message = f"'{place}': {error['msg']}, not {error['input']!r}"
     remedy = "correct the value; the module recipe.py lists the keys"
-    return UsageError("C02", message, where=where, remedy=remedy)
-
-
-Problems = Iterator[tuple[str, str, str]]  # code, message, remedy; the first one is raised
-
-
-def _bounds(recipe: Recipe) -> Problems:
-    """C02: every number is finite and inside its bounds."""
-    for path, key, value in _leaves(recipe):
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or path.startswith(("robot.", "missing.")):
-            continue
-        try:
-            x = float(value)  # type: ignore[arg-type]
-        except OverflowError:  # an integer of hundreds of digits
-            x = math.inf
-        said = f"'{path}' is {x}, must"
-        if not math.isfinite(x):
-            yield "C02", f"{said} be a finite number", "correct the number"
-        if abs(x) > RECIPE.largest:
-            yield "C02", f"{said} lie within ±{RECIPE.largest:g}", "correct it, or its unit"
-        if key in _POSITIVE and x <= 0.0:
-            yield "C02", f"{said} be above 0", "correct the number"
-        if key == "sign" and abs(x) != 1.0:
-            yield "C02", f"{said} be 1 or -1", "use scale for other factors"
-        if key in ("joint", "column", "columns") and (x < 1 or x != int(x)):
-            yield "C02", f"{said} be 1 or more", "joints and columns count from 1"
+    return UsageError("C02", message, where, remedy)
 
 
 def _format(recipe: Recipe) -> Problems:
-    """C02: delimiter, decimal sign, encoding and comment are such that a text can have."""
-    form = recipe.format
-    delimiter, comment, encoding = form.delimiter or ",", form.comment, form.encoding
-    wrong = []
+    """C02: delimiter, encoding and comment are such that a text can have."""
+    delimiter, encoding = recipe.format.delimiter or ",", recipe.format.encoding
+    comment = recipe.format.comment
     if len(delimiter) != 1 or delimiter in "\0\r\n.\"'" or delimiter.isalnum():
-        wrong.append(("delimiter", form.delimiter, "one character: , ; tab or blank"))
-    if form.decimal not in (None, ".", ","):
-        wrong.append(("decimal", form.decimal, "'.' or ','"))
+        yield "C02", f"'format.delimiter' is {delimiter!r}", "give one character: , ; tab or blank"
     try:
         "0".encode("utf-8" if encoding is None else encoding)
     except (LookupError, ValueError, TypeError):
-        wrong.append(("encoding", encoding, "for example utf-8 or latin-1"))
+        yield "C02", f"'format.encoding' is {encoding!r}", "give for example utf-8 or latin-1"
     if comment is not None and (not comment or any(c in comment for c in "\0\r\n")):
-        wrong.append(("comment", comment, "the characters that begin a comment"))
-    for key, value, remedy in wrong:
-        yield "C02", f"'format.{key}' is {value!r}", f"give {remedy}"
+        yield "C02", f"'format.comment' is {comment!r}", "give what begins a comment"
 
 
 def _signals(recipe: Recipe) -> Problems:
@@ -413,8 +403,8 @@ def _signals(recipe: Recipe) -> Problems:
         if "counts" in units and spec.counts_per_rev is None:
             message = f"'signals.{name}' is in counts: counts_per_rev is missing"
             yield "C02", message, "add counts_per_rev"
-    references = [name for name in ("q_ref", "dq_ref", "ddq_ref") if name in recipe.signals]
-    if len(references) not in (0, len(("q_ref", "dq_ref", "ddq_ref"))):
+    references = [name for name in _REFERENCES if name in recipe.signals]
+    if references and len(references) < len(_REFERENCES):
         message = f"{', '.join(references)} alone: q_ref, dq_ref and ddq_ref come together"
         yield "C02", message, "map all three, or none"
     for name in () if _maps_alone(recipe) else ("q", "tau"):
@@ -456,5 +446,4 @@ def _times(recipe: Recipe) -> Problems:
         remedy = "give the column of the time stamps, or the sampling rate [Hz]"
         yield "C02", "'time' has neither column nor rate", remedy
     if _no_logs(recipe):
-        remedy = 'write match = "*.csv" in [log], or [[file]] cases'
-        yield "C02", "the recipe matches no files", remedy
+        yield "C02", "the recipe matches no files", 'write match = "*.csv" in [log], or [[file]]'

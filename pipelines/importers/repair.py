@@ -19,9 +19,6 @@ from pipelines.io.limits import FEWEST, percent
 from pipelines.io.log import Array
 from pipelines.quality.subject import many
 
-_MEASURED = ("q", "dq", "tau", "current")
-_NO_SAMPLE = "if it means 'no sample', add [missing] values = [{}]; else the recording is damaged"
-
 Index = npt.NDArray[np.int64]
 
 
@@ -43,13 +40,9 @@ class Recording:
         """Return the recording of some samples."""
         kept = np.arange(self.t.size)[chosen]
         breaks = {int(np.searchsorted(kept, b)) for b in self.breaks} - {0, kept.size}
-        return replace(
-            self,
-            t=self.t[chosen],
-            signals={name: values[chosen] for name, values in self.signals.items()},
-            places=self.places[chosen],
-            breaks=tuple(sorted(breaks)),
-        )
+        signals = {name: values[chosen] for name, values in self.signals.items()}
+        places, breaks_kept = self.places[chosen], tuple(sorted(breaks))
+        return replace(self, t=self.t[chosen], signals=signals, places=places, breaks=breaks_kept)
 
     def listed(self, which: Index) -> str:
         """Return lines or rows in words, the first few."""
@@ -62,10 +55,10 @@ class Recording:
 
     def check(self, code: str, message: str, remedy: str, level: Level = "repair") -> Check:
         """Return a check of what was done to the recording, or is left as it is."""
-        return Check.of(code, level, message, where=self.where, remedy=remedy)
+        return Check.of(code, level, message, self.where, remedy)
 
     def refused(self, code: str, message: str, remedy: str) -> InputRejected:
-        return InputRejected(code, message, where=self.where, remedy=remedy)
+        return InputRejected(code, message, self.where, remedy)
 
 
 @dataclass(frozen=True)
@@ -75,8 +68,6 @@ class Limits:
     missing: tuple[float, ...] = ()
     longest_gap: float | None = None  # [s]; default what an observer predicts through
     resampled: bool = False
-    missing_rows: tuple[float, ...] = ()  # numbers of all measured signals at once
-    held: bool = False  # the torque is commanded
 
 
 def repair(recording: Recording, limits: Limits) -> tuple[tuple[Recording, ...], tuple[Check, ...]]:
@@ -88,32 +79,13 @@ def repair(recording: Recording, limits: Limits) -> tuple[tuple[Recording, ...],
     checks: list[Check] = []
     if recording.t.size <= 1:
         raise recording.refused("T08", many(recording.t.size, "sample"), "record again")
-    recording = _mark_missing(recording, limits, checks)
+    recording = _mark_missing(recording, limits.missing, checks)
     recording = _drop_missing(recording, checks)
     recording = _drop_duplicates(recording, checks)
-    parts = tuple(
-        piece
-        for part in _split_at_steps(recording, checks)
-        for piece in _split_at_gaps(part, limits, checks)
-    )
+    steady = _split_at_steps(recording, checks)
+    parts = tuple(piece for part in steady for piece in _split_at_gaps(part, limits, checks))
     for part in parts if not limits.resampled else ():
-        # T03, T05: lost samples and uneven time stay; of a resampled log they are in its record.
-        steps = np.diff(part.t)
-        median = float(np.median(steps))
-        rms, worst = common.jitter(steps / median)
-        gaps = late_intervals(part)
-        lost = int(np.round(steps[gaps] / median - 1.0).sum())
-        if lost:
-            share = f"{100.0 * lost / (lost + part.t.size):.2g} %"
-            where = f"{many(gaps.size, 'gap')} of at most {common.GAP_LIMIT}"
-            message = f"{many(lost, 'sample')} ({share}) lost in {where}, after {part.listed(gaps)}"
-            remedy = "give the recorder more priority, or record fewer signals"
-            checks.append(part.check("T03", message, remedy, "warn"))
-        if rms > common.LARGEST_JITTER:
-            vary = f"time is uneven: steps vary about {median:.6g} s by {percent(rms)} (rms)"
-            remedy = "add [resample] rate = … for an even grid"
-            message = f"{vary}, at most by {percent(worst)}"
-            checks.append(part.check("T05", message, remedy, "warn"))
+        checks += _uneven(part)  # of a resampled log, they are in its record
     return parts, tuple(checks)
 
 
@@ -123,41 +95,51 @@ def late_intervals(part: Recording) -> Index:
     return common.late(ticks, common.jitter(ticks)[0])
 
 
-def _mark_missing(recording: Recording, limits: Limits, checks: list[Check]) -> Recording:
+def _uneven(part: Recording) -> list[Check]:
+    """T03, T05: report lost samples and uneven time, which stay."""
+    checks = []
+    steps = np.diff(part.t)
+    median = float(np.median(steps))
+    rms, worst = common.jitter(steps / median)
+    gaps = late_intervals(part)
+    lost = int(np.round(steps[gaps] / median - 1.0).sum())
+    if lost:
+        share = f"{100.0 * lost / (lost + part.t.size):.2g} %"
+        where = f"{many(gaps.size, 'gap')} of at most {common.GAP_LIMIT}"
+        message = f"{many(lost, 'sample')} ({share}) lost in {where}, after {part.listed(gaps)}"
+        remedy = "give the recorder more priority, or record fewer signals"
+        checks.append(part.check("T03", message, remedy, "warn"))
+    if rms > common.LARGEST_JITTER:
+        message = f"time is uneven: steps vary about {median:.6g} s by {percent(rms)} (rms), at "
+        remedy = "add [resample] rate = … for an even grid"
+        checks.append(part.check("T05", f"{message}most by {percent(worst)}", remedy, "warn"))
+    return checks
+
+
+def _mark_missing(
+    recording: Recording, missing: tuple[float, ...], checks: list[Check]
+) -> Recording:
     """D03: make declared sentinels NaN; refuse infinite, absurd and undeclared ones."""
-    signals, problems, missing = {}, Gathering(), limits.missing
-    measured = [name for name in _MEASURED if name in recording.signals]
-    measured = [name for name in measured if name != "tau" or not limits.held]
-    lost = np.zeros((recording.t.size, 1), dtype=bool)
-    if measured and limits.missing_rows:
-        values = np.hstack([recording.signals[name] for name in measured])
-        lost = np.all(np.isin(values, limits.missing_rows), axis=1, keepdims=True)
-    if lost.any():
-        message = f"{int(lost.sum())} rows of all measured signals are declared missing"
-        remedy = "correct [missing] rows if these are samples"
-        checks.append(recording.check("D03", message, remedy))
+    signals, problems = {}, Gathering()
     for name, raw in recording.signals.items():
         hit = np.isin(raw, np.array(missing)) if missing else np.zeros(raw.shape, dtype=bool)
-        signals[name] = values = np.where(hit | lost, np.nan, raw)
+        signals[name] = values = np.where(hit, np.nan, raw)
         if hit.any():
             message = f"{int(hit.sum())} numbers of {name} are declared missing values"
-            remedy = "correct [missing] if these are samples"
-            checks.append(recording.check("D03", message, remedy))
+            checks.append(recording.check("D03", message, "correct [missing] if these are samples"))
         absurd = np.abs(values) * recording.si.get(name, 1.0) >= common.ABSURD
-        for joint in range(values.shape[1]):
-            where, column = recording.column(name, joint), values[:, joint]
+        filler = common.sentinels(values) & ~absurd
+        for joint in np.flatnonzero((absurd | filler).any(axis=0)):
+            bad = np.flatnonzero(absurd[:, joint] if absurd[:, joint].any() else filler[:, joint])
+            number = float(values[bad[0], joint])
+            message = f"{number:g} in {recording.listed(bad)}"
+            if not absurd[:, joint].any():
+                message += " looks like 'no sample': nothing else comes near it"
+            value = repr(number).removesuffix(".0")
+            remedy = f"if it means 'no sample', add [missing] values = [{value}]; else the "
+            where, remedy = recording.column(name, int(joint)), f"{remedy}recording is damaged"
             with problems.part():
-                if (bad := np.flatnonzero(absurd[:, joint])).size:
-                    message = f"{column[bad[0]]:g} in {recording.listed(bad)}"
-                    remedy = _NO_SAMPLE.format(repr(float(column[bad[0]])))
-                    raise InputRejected("D03", message, where=where, remedy=remedy)
-                filler = np.flatnonzero(common.sentinels(column[:, None])[:, 0])
-                if filler.size:
-                    value = f"{column[filler[0]]:.17g}"
-                    message = f"{value} in {recording.listed(filler)} looks like 'no sample': "
-                    message += "nothing else comes near it"
-                    remedy = _NO_SAMPLE.format(value)
-                    raise InputRejected("D03", message, where=where, remedy=remedy)
+                raise InputRejected("D03", message, where, remedy)
     problems.raise_all()
     return replace(recording, signals=signals)
 
@@ -173,13 +155,12 @@ def _drop_missing(recording: Recording, checks: list[Check]) -> Recording:
         raise recording.refused("D02", "no time stamp is a number", "choose another column of time")
     for name, values in recording.signals.items():
         holes = np.isnan(values)
-        for joint, share in enumerate(holes.mean(axis=0)):
-            if share > REPAIR.most_missing:
-                some = f"{100 * share:.0f} % of its samples are missing"
-                message = "holds no number at all" if share == 1.0 else some
-                remedy = "choose another column, or record again"
-                where = recording.column(name, joint)
-                raise InputRejected("D02", message, where=where, remedy=remedy)
+        for joint in np.flatnonzero(holes.mean(axis=0) > REPAIR.most_missing):
+            share = holes[:, joint].mean()
+            some = f"{100 * share:.0f} % of its samples are missing"
+            message = "holds no number at all" if share == 1.0 else some
+            where, remedy = recording.column(name, int(joint)), "choose another column, or record again"
+            raise InputRejected("D02", message, where, remedy)
         lost |= holes.any(axis=1)
     if not lost.any():
         return recording
@@ -220,9 +201,8 @@ def _split_at_steps(recording: Recording, checks: list[Check]) -> tuple[Recordin
     cuts = sorted({*map(int, back), *(() if recording.clocked else recording.breaks)})
     kept, into = _cut(recording, cuts)
     if cuts:
-        code, why = "F09", "lines are lost and no clock says how many"
-        if back.size:
-            code, why = "T01", "time steps back"
+        lost = ("F09", "lines are lost and no clock says how many")
+        code, why = ("T01", "time steps back") if back.size else lost
         message = f"{why} at {recording.listed(np.array(cuts))}: {into}"
         checks.append(recording.check(code, message, "record without interruption, by one clock"))
     if not kept:

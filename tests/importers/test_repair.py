@@ -62,18 +62,6 @@ def test_d03_an_absurd_number_is_refused_unless_it_is_declared_missing(value: fl
     assert part.t.size == 1198
 
 
-@pytest.mark.parametrize(("held", "tau", "count"), [(False, 0.0, 1), (True, 0.3, 2)])
-def test_d03_declared_rows_are_left_out_and_single_zeros_kept(held: bool, tau: float, count: int) -> None:
-    """A torque that was commanded goes on where nothing was measured; the motion begins at zero."""
-    zeros = changed("q", [10, 20], 0, 0.0)
-    for joint in range(3):
-        zeros.signals["q"][10, joint], zeros.signals["tau"][10, joint] = 0.0, tau
-    (part,), checks = repair(zeros, Limits(missing_rows=(0.0,), held=held))
-    assert f"{count} rows of all measured signals" in checks[0].message
-    assert part.t.size == 1200 - count
-    assert not repair(zeros, Limits(missing_rows=(7.0,)))[1]
-
-
 def test_t01_a_clock_that_was_set_back_splits_the_log() -> None:
     t = recording().t.copy()
     t[500:] -= 0.3
