@@ -118,7 +118,7 @@ def read(request: Request, settings: Settings) -> Inputs:
     """Read the recipe, its robot and every file it matches."""
     if not settings.recipe:
         remedy = "name one, or draft one with --guess FILE"
-        raise UsageError("C02", "no recipe", where="rrrid import", remedy=remedy)
+        raise UsageError("C02", "no recipe", "rrrid import", remedy)
     material = collect(settings.recipe, settings.source, request.robot, request.tell)
     material = replace(material, assume_units=request.assume_units, ending=request.format)
     return Inputs(

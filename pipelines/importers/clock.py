@@ -47,19 +47,19 @@ def time_of(table: RawTable, spec: TimeSpec, assume: bool = False) -> tuple[Arra
         median = float(np.median(rising)) if rising.size else 1.0
         if names[1:] and declared is None:
             remedy = 'give [time] one unit a column: unit = ["s", "ns"]'
-            raise InputRejected("S08", "no unit", where=where, remedy=remedy)
+            raise InputRejected("S08", "no unit", where, remedy)
         unit, said = _unit(declared, table.units.get(name), median, step, where, assume)
         checks += said
         if unit in _INDEX and step is None:
             message = "time is a sample index, but no rate is declared"
-            raise InputRejected("S08", message, where=where, remedy="add rate = … [Hz] to [time]")
+            raise InputRejected("S08", message, where, "add rate = … [Hz] to [time]")
         factor = step if unit in _INDEX and step else to_si(unit, "time", where=where).factor
         # An epoch: seconds since 1970 cost digits.
         far = abs(finite[0]) > CLOCK.epoch * median * finite.size
         origin = float(finite[0]) if far else 0.0
         if origin:
             message = f"time starts at {origin:.16g} {unit}; counted from there"
-            checks.append(Check.of("S08", "ok", message, where=where))
+            checks.append(Check.of("S08", "ok", message, where))
         total += (stamps - origin) * factor
     if not names[1:]:
         _refuse_implausible(median, factor, unit, step, where)
@@ -93,24 +93,24 @@ def _unit(
         if header and quantity_of(known) == "time" and other:
             message = f"the header says '{header}', the recipe says '{declared}'"
             remedy = "correct one of them: the unit in [time], or the header"
-            raise InputRejected("S08", message, where=where, remedy=remedy)
+            raise InputRejected("S08", message, where, remedy)
         return declared, []
     if header:
         message = f"unit '{header}' of time taken from the header"
-        return header, [Check.of("S06", "ok", message, where=where)]
+        return header, [Check.of("S06", "ok", message, where)]
     fits = _fitting(median, step) if step is not None else []
     if step is not None and len(fits) == 1:
         message = f"unit of time not declared; {fits[0]} fits the declared rate of "
         remedy = f'add unit = "{fits[0]}" to [time]'
         words = f"{message}{1 / step:.6g} Hz"
-        return fits[0], [Check.of("S08", "warn", words, where=where, remedy=remedy)]
+        return fits[0], [Check.of("S08", "warn", words, where, remedy)]
     if step is None and assume:
         message = "unit of time not declared; taken as s, as --assume-units says"
-        return "s", [Check.of("S04", "warn", message, where=where, remedy="write it in the recipe")]
+        return "s", [Check.of("S04", "warn", message, where, "write it in the recipe")]
     rates = [f"{unit} ({rate:.4g} Hz)" for unit, rate in _plausible(median).items()]
     options = ", ".join(rates) or "none plausible"
     message = f"unit of time not declared; its step of {median:.6g} could be: {options}"
-    raise InputRejected("S08", message, where=where, remedy="add unit or rate to [time]")
+    raise InputRejected("S08", message, where, "add unit or rate to [time]")
 
 
 def _refuse_implausible(
@@ -121,10 +121,9 @@ def _refuse_implausible(
         fits = _fitting(median, step)
         hint = f"; in {fits[0]} it would fit" if fits else ""
         message = f"time in {unit} makes {found:.6g} Hz, but {1 / step:.6g} Hz is declared{hint}"
-        remedy = "correct unit or rate in [time]"
-        raise InputRejected("S08", message, where=where, remedy=remedy)
+        raise InputRejected("S08", message, where, "correct unit or rate in [time]")
     if step is None and not CLOCK.slowest / 10 <= found <= 10 * CLOCK.fastest:
         right = " or ".join(_plausible(median)) or "a sample index"
         message = f"time in {unit} makes {found:.6g} Hz; {right} looks right"
         remedy = "correct the unit in [time], or add the rate to confirm it"
-        raise InputRejected("S08", message, where=where, remedy=remedy)
+        raise InputRejected("S08", message, where, remedy)

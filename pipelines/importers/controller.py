@@ -54,7 +54,7 @@ def controller_table(
         spec = recipe.signals.get("q")
         if spec is None:
             message, remedy = "the recipe has no signal q", "give a recipe that imports positions"
-            raise UsageError("C02", message, where=recipe.where, remedy=remedy)
+            raise UsageError("C02", message, recipe.where, remedy)
         units = units_of_recipe("q", spec, robot, recipe.where)[0] if spec.unit else units
         # q = q_recorded A + b, of which zeros and a quarter of each unit vector show b and A.
         probe = 0.25 * np.eye(n + 1, n, -1)

@@ -117,13 +117,13 @@ def _sound(table: RawTable, path: Path) -> RawTable:
     if len(table.columns) > GUESS.most_columns:
         message = f"{len(table.columns)} columns: too many to guess what each is"
         remedy = "export the joints' signals alone, or write the recipe"
-        raise InputRejected("F16", message, where=path, remedy=remedy)
+        raise InputRejected("F16", message, path, remedy)
     known = {c: np.isfinite(x) & (np.abs(x) < GUESS.no_number) for c, x in table.columns.items()}
     usable = [c for c, mask in known.items() if mask.mean() > GUESS.usable]
     keep = np.all([known[c] for c in usable], axis=0) & bool(usable)
     if keep.sum() < FEWEST:
         message, remedy = f"{keep.sum()} samples without a hole", "give a recording of a motion"
-        raise InputRejected("T08", message, where=table.source, remedy=remedy)
+        raise InputRejected("T08", message, table.source, remedy)
     columns = {c: table.columns[c][keep] for c in usable}
     return replace(table, columns=columns, rows=table.rows[keep], lines=None)
 

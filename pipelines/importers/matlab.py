@@ -33,7 +33,7 @@ _BAD_MAT = (ValueError, TypeError, IndexError, KeyError, OSError, OverflowError,
 def damaged_mat(source: str) -> InputRejected:
     """Return F08, with the only sentence for it."""
     remedy = "copy it again, or save it again from MATLAB"
-    return InputRejected("F08", "truncated or damaged MAT file", where=source, remedy=remedy)
+    return InputRejected("F08", "truncated or damaged MAT file", source, remedy)
 
 
 def read_mat5(data: bytes, source: str) -> dict[str, Any]:
@@ -55,7 +55,7 @@ def read_mat5(data: bytes, source: str) -> dict[str, Any]:
             loaded = loadmat(io.BytesIO(data), variable_names=names, simplify_cells=True)
     except MatReadWarning as problem:
         message, remedy = f"a variable is there twice: {problem}", "save each variable once"
-        raise InputRejected("S03", message, where=source, remedy=remedy) from None
+        raise InputRejected("S03", message, source, remedy) from None
     except (*_BAD_MAT, MatReadError, UserWarning):
         raise damaged_mat(source) from None
     if not set(names) <= loaded.keys():
@@ -76,10 +76,10 @@ def _wanted(listed: list[tuple[str, tuple[int, ...], str]], source: str) -> list
     if not names and foreign:
         message = f"holds only objects, which are never built: {foreign}"
         remedy = "save the signals as numeric arrays, or timetables as struct of arrays"
-        raise InputRejected("X07", message, where=source, remedy=remedy)
+        raise InputRejected("X07", message, source, remedy)
     if not names:
         remedy = "save the signals as numeric arrays"
-        raise InputRejected("S12", "no numeric variable", where=source, remedy=remedy)
+        raise InputRejected("S12", "no numeric variable", source, remedy)
     return names
 
 
@@ -129,7 +129,7 @@ def _members(group: Any, prefix: str, source: str) -> Iterator[tuple[str, Any]]:
     for count, name in enumerate(group):
         if count > ARRAYS.most_members:
             message = f"more than {ARRAYS.most_members} members"
-            raise InputRejected("X04", message, where=source, remedy="save the signals alone")
+            raise InputRejected("X04", message, source, "save the signals alone")
         link = group.get(name, getlink=True)
         if isinstance(link, h5py.ExternalLink):
             raise _stored_elsewhere("X01", f"external link '{prefix}{name}' refused", source)

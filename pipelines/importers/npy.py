@@ -46,23 +46,23 @@ def read_npy(data: bytes, source: str, objects: bool = False) -> dict[str, Anyth
     if kind.hasobject:
         message = "holds pickled Python objects, which are never opened"
         remedy = "save plain numbers: numpy.save(…, allow_pickle=False)"
-        raise InputRejected("X07", message, where=source, remedy=remedy)
+        raise InputRejected("X07", message, source, remedy)
     count = math.prod(shape)
     size = count * kind.itemsize
     if size > ARRAYS.budget:
         raise too_large(size, source)
     if start + size != len(data):
         message = f"truncated or damaged: {len(data)} of {start + size} bytes"
-        raise InputRejected("F02", message, where=source, remedy="copy the file again")
+        raise InputRejected("F02", message, source, "copy the file again")
     if size == 0:
-        raise InputRejected("T08", "no sample", where=source, remedy="record again")
+        raise InputRejected("T08", "no sample", source, "record again")
     flat = np.frombuffer(data, dtype=kind, count=count, offset=start)
     array = flat.reshape(shape, order="F" if by_columns else "C")
     if kind.names is None:
         return {"column": array}
     if array.ndim != 1:
         message, remedy = f"a structured array of shape {shape}", "save one record a sample"
-        raise InputRejected("S11", message, where=source, remedy=remedy)
+        raise InputRejected("S11", message, source, remedy)
     return {name: array[name] for name in kind.names}
 
 
@@ -84,7 +84,7 @@ def _npy_header(data: bytes, source: str) -> tuple[np.dtype[Any], bool, tuple[in
         np.empty(0, kind).reshape([0, *shape[1:]])  # no more sides than arrays have
     except _BAD_HEADER:
         message, remedy = "damaged NPY header", "save or copy the file again"
-        raise InputRejected("F08", message, where=source, remedy=remedy) from None
+        raise InputRejected("F08", message, source, remedy) from None
     return kind, by_columns, shape, stream.tell()
 
 
@@ -101,7 +101,7 @@ def read_npz(data: bytes, source: str) -> dict[str, Anything]:
             members = archive.infolist()
             if any(not member.filename.endswith(".npy") for member in members):
                 message = "an archive of other files than arrays, not a recording"
-                raise UsageError("X12", message, where=source, remedy="unpack it")
+                raise UsageError("X12", message, source, "unpack it")
             declared = sum(member.file_size for member in members)
             if declared > ARRAYS.most_bytes(len(data)):
                 raise too_large(declared, source)
@@ -112,7 +112,7 @@ def read_npz(data: bytes, source: str) -> dict[str, Anything]:
                     found[name if field == "column" else f"{name}.{field}"] = array
     except _BAD_ARCHIVE:
         message, remedy = "truncated or damaged NPZ archive", "save or copy it again"
-        raise InputRejected("F08", message, where=source, remedy=remedy) from None
+        raise InputRejected("F08", message, source, remedy) from None
     return found
 
 
@@ -132,7 +132,7 @@ def read_parquet(data: bytes, source: str) -> dict[str, Anything]:
             if b"rrrid" in (file.schema_arrow.metadata or {}):
                 message = "a log of this program, not a recording"
                 remedy = "it needs no import: rrrid inspect reads it"
-                raise InputRejected("F06", message, where=source, remedy=remedy)
+                raise InputRejected("F06", message, source, remedy)
             cells = file.metadata.num_rows * file.metadata.num_columns
             refuse_oversize(8 * cells, len(data), "X06", source)
             table = file.read()
@@ -151,5 +151,5 @@ def read_parquet(data: bytes, source: str) -> dict[str, Anything]:
         raise
     except (pa.ArrowException, OSError, ValueError, TypeError, IndexError, struct.error):
         message, remedy = "truncated or damaged Parquet file", "save or copy it again"
-        raise InputRejected("F08", message, where=source, remedy=remedy) from None
+        raise InputRejected("F08", message, source, remedy) from None
     return found

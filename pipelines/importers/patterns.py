@@ -28,8 +28,7 @@ def _compiled(pattern: str) -> re.Pattern[str]:
     """
     if len(pattern) > RECIPE.longest_pattern:
         message = f"a pattern of {len(pattern)} characters"
-        remedy = f"write at most {RECIPE.longest_pattern}"
-        raise UsageError("C02", message, where="match", remedy=remedy)
+        raise UsageError("C02", message, "match", f"write at most {RECIPE.longest_pattern}")
     shell = ((r"\*\*", ".*"), (r"\*", "[^/]*"), (r"\?", "[^/]"))
     expression, seen = "", set[str]()
     for k, part in enumerate(_FIELD.split(pattern)):
@@ -49,7 +48,7 @@ def _compiled(pattern: str) -> re.Pattern[str]:
     except re.error as problem:
         message = f"pattern '{pattern}': {problem}"
         remedy = "write {name}, or {name:regular expression}"
-        raise UsageError("C02", message, where="match", remedy=remedy) from None
+        raise UsageError("C02", message, "match", remedy) from None
 
 
 def matches(
@@ -81,7 +80,7 @@ def matches(
     except InputRejected:
         message = f"a pattern takes more than {RECIPE.seconds:.0f} s: {', '.join(flat)}"
         remedy = "write fewer wildcards, and no repetition inside another, such as (a+)+"
-        raise UsageError("C02", message, where=where, remedy=remedy) from None
+        raise UsageError("C02", message, where, remedy) from None
     return list(found.about["found"])
 
 
@@ -104,8 +103,7 @@ def fill(template: str, groups: Mapping[str, str], where: object) -> str:
     for name in re.findall(r"\{(\w+)\}", template):
         if name not in groups:
             message = f"'{template}' names {{{name}}}, but the pattern has {', '.join(groups)}"
-            remedy = "name one of these, or add it to the pattern"
-            raise UsageError("C02", message, where=where, remedy=remedy)
+            raise UsageError("C02", message, where, "name one of these, or add it to the pattern")
     return re.sub(r"\{(\w+)\}", lambda found: groups[found[1]], template)
 
 
@@ -118,8 +116,7 @@ def files_below(folder: Path) -> tuple[str, ...]:
         UsageError: C07, too many. EnvironmentFault: no permission.
     """
     if not os.access(folder, os.R_OK | os.X_OK):
-        remedy = "change its permissions"
-        raise EnvironmentFault("F13", "permission denied", where=folder, remedy=remedy)
+        raise EnvironmentFault("F13", "permission denied", folder, "change its permissions")
     found: list[str] = []
     for parent, folders, names in os.walk(folder, followlinks=False):
         folders[:] = sorted(f for f in folders if not f.startswith("."))
@@ -127,8 +124,7 @@ def files_below(folder: Path) -> tuple[str, ...]:
         found += [Path(parent, name).relative_to(folder).as_posix() for name in shown]
         if len(found) > RECIPE.most_files:
             message = f"more than {RECIPE.most_files} files"
-            remedy = "give a folder that holds the recordings only"
-            raise UsageError("C07", message, where=folder, remedy=remedy)
+            raise UsageError("C07", message, folder, "give a folder that holds the recordings only")
     return tuple(sorted(found))
 
 
@@ -140,8 +136,7 @@ def inside(folder: Path, relative: str, where: object) -> Path:
     """
     if Path(relative).is_absolute() or os.path.normpath(relative).startswith(".."):
         message = f"'{relative}' lies outside the source folder"
-        remedy = "keep the files of a recording together"
-        raise UsageError("X11", message, where=where, remedy=remedy)
+        raise UsageError("X11", message, where, "keep the files of a recording together")
     return folder / relative
 
 

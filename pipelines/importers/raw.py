@@ -60,15 +60,14 @@ class RawTable:
             if 1 <= column <= len(names):
                 return names[column - 1]
             message = f"no column {column}; the file has {len(names)} columns of numbers"
-            remedy = "columns count from 1; correct the recipe"
-            raise InputRejected("S01", message, where=where, remedy=remedy)
+            raise InputRejected("S01", message, where, "columns count from 1; correct the recipe")
         if column in self.columns:
             return column
         whole = column if column in self.text else re.sub(_NUMBERED, "", column)
         if whole in self.text:
             message = f"column '{whole}' holds no numbers but '{clean(self.text[whole], 80)}'"
             remedy = "export it as numbers, one row a sample, or choose another column"
-            raise InputRejected("S12", message, where=where, remedy=remedy)
+            raise InputRejected("S12", message, where, remedy)
         every, remedy = [*names, *self.text], "correct the recipe"
         there = ", ".join(every[: ARRAYS.listed])
         message = f"no column '{column}'{did_you_mean(column, every)}; there are {there}"
@@ -77,7 +76,7 @@ class RawTable:
             alike = [name for name in names if read_name(name).quantity == kind]
             near = did_you_mean(column, alike or names)[16:-2] or [*alike, "…"][0]
             remedy += f", or pass --map {wanted}='{near}'"
-        raise InputRejected("S01", message, where=where, remedy=remedy)
+        raise InputRejected("S01", message, where, remedy)
 
 
 def expand(
@@ -106,7 +105,7 @@ def expand(
         why = why or "the recipe names " + ", ".join(str(c) for c in chosen)
         message = f"{len(chosen)} columns for {signal}, but the robot has {n} joints ({why})"
         remedy = "name the robot this was recorded on, or list the columns of its joints"
-        raise InputRejected("S02", message, where=table.source, remedy=remedy)
+        raise InputRejected("S02", message, table.source, remedy)
     chosen = tuple((instead or {}).get(j, column) for j, column in enumerate(chosen, start=1))
     names = tuple(table.name_of(c, f"{signal}_{j}") for j, c in enumerate(chosen, start=1))
     for j, name_j in enumerate(names, start=1):
@@ -114,7 +113,7 @@ def expand(
             message = f"column '{name_j}' serves {signal} of joint {first} and of joint {j}"
             remedy = f"give each joint its own column in signals.{signal}"
             remedy += f", or by --map {signal}_{j}=…"
-            raise UsageError("C02", message, where=table.source, remedy=remedy)
+            raise UsageError("C02", message, table.source, remedy)
     return names
 
 
@@ -188,8 +187,7 @@ def table_of(document: Any, source: str) -> RawTable:
             continue
         if name in arrays:
             message = f"two series are both named '{clean(name, 80)}'"
-            remedy = "rename one of them in the file"
-            raise InputRejected("S03", message, where=source, remedy=remedy)
+            raise InputRejected("S03", message, source, "rename one of them in the file")
         # MATLAB's timeseries of a vector is (n, 1, samples).
         arrays[name] = array.squeeze() if array.shape[2:] else array
     problems = {name: _not_real(array) for name, array in arrays.items() if array.size != 1}
@@ -210,7 +208,7 @@ def table_of(document: Any, source: str) -> RawTable:
         if rows not in (samples, 1):
             message = f"'{name}' is stored as {(rows, wide)}, read as {matrix.shape}: time along "
             words, remedy = f"{message}the long side", "store one row a sample"
-            checks.append(Check.of("S11", "warn", words, where=source, remedy=remedy))
+            checks.append(Check.of("S11", "warn", words, source, remedy))
         short, unit = split_unit(name)
         several = tuple(f"{short}_{j + 1}" for j in range(matrix.shape[1]))
         names = several if several[1:] else (short,)
@@ -219,12 +217,11 @@ def table_of(document: Any, source: str) -> RawTable:
     if others := [name for name, why in text.items() if why.endswith(" samples")]:
         message = f"left out, not of {samples} samples: {', '.join(map(repr, others[:8]))}"
         remedy = "save another motion as a file of its own"
-        checks.append(Check.of("S11", "warn", message, where=source, remedy=remedy))
+        checks.append(Check.of("S11", "warn", message, source, remedy))
     if not columns:
         found = ", ".join(f"{name} ({what})" for name, what in text.items()) or "nothing"
         message = f"no array of real numbers; there is {found}"
-        remedy = "save plain numeric arrays, one row a sample"
-        raise InputRejected("S12", message, where=source, remedy=remedy)
+        raise InputRejected("S12", message, source, "save plain numeric arrays, one row a sample")
     notes = [
         f"{name} = {' '.join(map(str, array.flat))[: ARRAYS.longest_text]}"
         for name, array in arrays.items()
@@ -268,7 +265,7 @@ def _samples_of(arrays: Mapping[str, Anything], source: str) -> int:
         if only_square or (near and enough.get(rows) == enough.get(wide)):
             message = f"'{name}' has shape {(rows, wide)}: which side is time is not known"
             remedy = "store one row a sample, with many more samples than columns"
-            raise InputRejected("S11", message, where=source, remedy=remedy)
+            raise InputRejected("S11", message, source, remedy)
     return samples
 
 

@@ -54,34 +54,28 @@ class FileSpec:
     """`[[file]]`: where files of this pattern differ from `[log]`. The first match counts."""
 
     __pydantic_config__ = _STRICT
-    match: Texts
-    name: str | None = None
-    experiment: Experiment | None = None
+    match: Texts = ()
+    name: str | None = None  # may hold {groups} of the pattern, and {stem}
+    experiment: Experiment | None = None  # a group {experiment}, {role} or {joint} comes first
     role: Role | None = None
-    joint: int | None = None
-    period: float | None = None
-    recorded: str | None = None
-    posture: tuple[float, ...] | None = None
+    joint: int | None = None  # 1-based, of friction and frf logs
+    period: float | None = None  # [s]
+    recorded: str | None = None  # ISO 8601 or a date of TOML, with its offset from UTC
+    posture: tuple[float, ...] | None = None  # [rad]
     begin: float | None = None  # [s] left out of the beginning: an approach, homing
     skip: bool = False  # files of this pattern are no logs
 
 
 @dataclass(frozen=True)
-class LogSpec:
-    """`[log]`: of every log. {groups} of the pattern and {stem} may be in `name`."""
+class LogSpec(FileSpec):
+    """`[log]`: of every log."""
 
     __pydantic_config__ = _STRICT
-    match: Texts = ()
     name: str = "{stem}"
-    experiment: Experiment = "free"  # a group {experiment}, {role} or {joint} comes first
+    experiment: Experiment = "free"
     role: Role = "identify"
     origin: Literal["measured", "simulated"] = "measured"
     torque: Literal["held-command", "measured"] = "held-command"
-    joint: int | None = None  # 1-based, of friction and frf logs
-    period: float | None = None  # [s]
-    recorded: str | None = None  # ISO 8601 or a date of TOML, with its offset from UTC
-    posture: tuple[float, ...] | None = None  # [rad]
-    begin: float | None = None  # [s] left out of the beginning of a log
 
 
 @dataclass(frozen=True)

@@ -159,7 +159,10 @@ def _drop_missing(recording: Recording, checks: list[Check]) -> Recording:
             share = holes[:, joint].mean()
             some = f"{100 * share:.0f} % of its samples are missing"
             message = "holds no number at all" if share == 1.0 else some
-            where, remedy = recording.column(name, int(joint)), "choose another column, or record again"
+            where, remedy = (
+                recording.column(name, int(joint)),
+                "choose another column, or record again",
+            )
             raise InputRejected("D02", message, where, remedy)
         lost |= holes.any(axis=1)
     if not lost.any():

@@ -241,10 +241,10 @@ def _clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
         where = f"{table.source}, column '{times[0]}'"
         if any(_rises(-table.columns[c]) for c in times):
             message, remedy = "falls from row to row: the newest row is first", "sort the rows"
-            raise InputRejected("T01", message, where=where, remedy=f"{remedy}, the oldest first")
+            raise InputRejected("T01", message, where, f"{remedy}, the oldest first")
         message = "does not rise from row to row: several rows a sample, or too few digits?"
         remedy = "export one row a sample, and its time with all digits"
-        raise InputRejected("S11", message, where=where, remedy=remedy)
+        raise InputRejected("S11", message, where, remedy)
     if not rising:
         plain = [c for c in [*table.columns][:1] if not of[c].quantity and len(table.columns) > 2]  # noqa: PLR2004
         rising = [

@@ -13,7 +13,7 @@ import fcntl
 import hashlib
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,7 @@ import numpy as np
 from pipelines.errors import Check, EnvironmentFault, InputRejected, UsageError
 from pipelines.importers import matlab, npy
 from pipelines.importers.config import ARRAYS
-from pipelines.importers.raw import RawTable, flatten, table_of
+from pipelines.importers.raw import RawTable, table_of
 from pipelines.importers.recipe import TextFormat
 from pipelines.importers.text import read_text
 from pipelines.io.limits import FEWEST
@@ -72,6 +72,12 @@ def _h5py() -> object:
     return h5py
 
 
+def _pandas() -> object:
+    import pandas
+
+    return pandas
+
+
 def _pyarrow() -> object:
     import pyarrow.compute
     import pyarrow.parquet
@@ -88,7 +94,8 @@ READERS = (
            lambda _, path, source: matlab.read_hdf5(path, source), _h5py),
     Reader("mat5", (b"MATLAB 5.0",), (".mat",),
            lambda data, _, source: matlab.read_mat5(data, source), _scipy),
-    Reader("json", (), (".json", ".jsonl"), lambda data, _, source: read_json(data, source)),
+    Reader("json", (), (".json", ".jsonl"), lambda data, _, source: read_json(data, source),
+           _pandas),
     Reader("text", (), (), lambda data, _, source: read_text(data, source)),
 )  # fmt: skip
 
@@ -117,13 +124,12 @@ def read_table(path: Path, text: TextFormat | None = None, name: str = "") -> Ra
     longest = max((*table.columns, *table.text, ""), key=len)
     if len(longest) > ARRAYS.longest_name:
         message = f"the name of a column has {len(longest)} characters, {longest[:40]} …"
-        remedy = "export the table with a header of short names"
-        raise InputRejected("F16", message, where=source, remedy=remedy)
+        raise InputRejected("F16", message, source, "export the table with a header of short names")
     checks, ending = table.checks, path.suffix.lower()
     foreign = reader.kind != "text" or any(ending in other.endings for other in READERS)
     if ending not in reader.endings and foreign:
         message = f"named '{path.suffix}', but its content is {reader.kind}; read as that"
-        checks = (Check.of("F06", "warn", message, where=source, remedy="rename it"), *checks)
+        checks = (Check.of("F06", "warn", message, source, "rename it"), *checks)
     return replace(table, checks=checks, sha256=hashlib.sha256(data).hexdigest())
 
 
@@ -136,7 +142,7 @@ def _bytes_of(path: Path) -> bytes:
     status = regular_file(path)
     if status.st_size > ARRAYS.largest_file:
         message = f"{status.st_size} bytes; import reads files up to {ARRAYS.largest_file}"
-        raise InputRejected("X05", message, where=path, remedy="split the recording")
+        raise InputRejected("X05", message, path, "split the recording")
     try:
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         with os.fdopen(handle, "rb") as file:
@@ -144,7 +150,7 @@ def _bytes_of(path: Path) -> bytes:
                 fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
             except BlockingIOError:
                 message, remedy = "in use by another process", "wait until the recording is done"
-                raise EnvironmentFault("F15", message, where=path, remedy=remedy) from None
+                raise EnvironmentFault("F15", message, path, remedy) from None
             except OSError:
                 pass  # a file system without locks cannot say
             data = file.read(status.st_size + 1)  # as much is allocated as is asked for
@@ -167,7 +173,7 @@ def _reader_of(data: bytes, source: str) -> Reader:
             raise kind(code, f"{what}, not a recording", where=source, remedy=remedy)
     if data.startswith(_PICKLES):
         message, remedy = "a pickle, which is never opened", "save plain numbers as NPY or CSV"
-        raise InputRejected("X07", message, where=source, remedy=remedy)
+        raise InputRejected("X07", message, source, remedy)
     for reader in READERS:
         if reader.magic and data.startswith(reader.magic):
             return reader
@@ -221,87 +227,52 @@ def read_json(data: bytes, source: str) -> Any:
     """
     if len(data) > ARRAYS.largest_json:
         message = f"{len(data)} bytes of JSON; import reads up to {ARRAYS.largest_json}"
-        remedy = "split the recording, or save it as CSV or NPY"
-        raise InputRejected("X05", message, where=source, remedy=remedy)
+        raise InputRejected("X05", message, source, "split the recording, or save it as CSV or NPY")
     try:
         text = data.decode("utf-8-sig")
         try:
             document = json.loads(text)
         except json.JSONDecodeError:
             document = [json.loads(line) for line in text.splitlines() if line.strip()]
-    except (ValueError, RecursionError) as problem:
-        message = f"not valid JSON: {problem}"
+        return _series(document)
+    except (ValueError, TypeError, AttributeError, OverflowError, RecursionError) as problem:
+        message = f"not valid JSON of a recording: {problem}"
         remedy = "copy the file again, or end the recording before it is copied"
-        raise InputRejected("F08", message, where=source, remedy=remedy) from None
-    document = _frame_of_pandas(document)
-    frames = _frames(document, ARRAYS.deepest)
+        raise InputRejected("F08", message, source, remedy) from None
+
+
+def _series(document: Any) -> Any:
+    """Return arrays by name of a document that pandas wrote, or of the longest list of frames."""
+    import pandas as pd
+
+    if isinstance(document, dict) and document.keys() >= {"columns", "data"}:
+        document = pd.DataFrame(document["data"], columns=document["columns"]).to_dict("list")
+    columns = document.values() if isinstance(document, dict) else [None]
+    if all(isinstance(x, dict) and all(map(str.isdecimal, x)) for x in columns):
+        return {name: list(column.values()) for name, column in document.items()}
+    frames = max(_lists_of_frames(document, ARRAYS.deepest), key=len, default=None)
     if frames is None:
         return document
-    around = {} if document is frames else _without(document, frames)
-    return around | _series_of(frames, len(data), source)
-
-
-def _frame_of_pandas(document: Any) -> Any:
-    """Return a frame that pandas wrote as an array of each column; anything else unchanged."""
-    if not isinstance(document, dict) or not document:
-        return document
-    names, rows = document.get("columns"), document.get("data")
-    if isinstance(names, list) and isinstance(rows, list) and rows:
-        square = all(isinstance(row, list) and len(row) == len(names) for row in rows)
-        columns = map(list, zip(*rows, strict=True)) if square else ()
-        return dict(zip(map(str, names), columns, strict=True)) if square else document
-    numbered = all(
-        isinstance(x, dict) and x and all(map(str.isdecimal, x)) for x in document.values()
-    )
-    return {k: list(column.values()) for k, column in document.items()} if numbered else document
-
-
-def _frames(value: Any, depth: int) -> list[Mapping[str, Any]] | None:
-    """Return the longest list of objects in the document."""
-    if isinstance(value, list):
-        enough = len(value) >= FEWEST and all(isinstance(item, dict) for item in value)
-        return value if enough else None
-    if not isinstance(value, dict) or depth == 0:
-        return None
-    found = [frames for item in value.values() if (frames := _frames(item, depth - 1)) is not None]
-    return max(found, key=len, default=None)
-
-
-def _without(document: Any, frames: object) -> Any:
-    if not isinstance(document, dict):
-        return document
-    return {k: _without(item, frames) for k, item in document.items() if item is not frames}
-
-
-def _series_of(frames: Sequence[Mapping[str, Any]], size: int, source: str) -> dict[str, Any]:
-    """Return an array of each value of the frames in a file of `size` bytes, or its first text."""
-    series: dict[str, list[Any]] = {}
-    for i, frame in enumerate(frames):
-        for path, value in flatten(frame):
-            if path not in series:
-                series[path] = [None] * len(frames)
-            series[path][i] = value
-        cells = len(series) * len(frames)
-        if len(series) > ARRAYS.most_columns or cells > 8 * size + ARRAYS.always:
-            message = f"more than {ARRAYS.most_columns} numbers in a frame"
-            remedy = "save the signals of the joints alone"
-            raise InputRejected("X05", message, where=source, remedy=remedy)
     found: dict[str, Any] = {}
-    for path, values in series.items():
-        first = next((value for value in values if value is not None), "")
-        width = len(first) if isinstance(first, list) else 1
-        texts = isinstance(first, str) or (
-            width and isinstance(first, list) and isinstance(first[0], str)
-        )
-        if texts or not width:
-            found[path] = " ".join(first) if isinstance(first, list) else first
-            continue
-        try:
-            rows = [[np.nan] * width if value is None else np.atleast_1d(value) for value in values]
-            array = np.array(rows, dtype=np.float64)
-            listed = isinstance(first, list) and width <= ARRAYS.widest
-            parts = {f"{path}[{k}]": column for k, column in enumerate(array.T)}
-            found |= parts if listed else {path: array}
-        except (ValueError, TypeError, OverflowError):
-            found[path] = np.empty(0, object)
+    if isinstance(document, dict):
+        found = {name: x for name, x in document.items() if not isinstance(x, list)}
+    frame = pd.json_normalize(frames, max_level=ARRAYS.deepest)
+    for name, column in frame.items():
+        first = column.iloc[0]
+        if isinstance(first, str):
+            found[str(name)] = first
+        elif not isinstance(first, list):
+            found[str(name)] = pd.to_numeric(column, errors="coerce").to_numpy()
+        elif all(isinstance(x, str) for x in first):  # the joints' names, in every frame
+            found[str(name)] = " ".join(first)
+        elif len({len(x) if isinstance(x, list) else 0 for x in column}) == 1:
+            items = zip(*column, strict=True)
+            found |= {f"{name}[{k}]": array for k, x in enumerate(items) if (array := list(x))}
     return found
+
+
+def _lists_of_frames(value: Any, depth: int) -> Iterator[list[dict[str, Any]]]:
+    if isinstance(value, list) and len(value) >= FEWEST and all(isinstance(x, dict) for x in value):
+        yield value
+    for inner in value.values() if isinstance(value, dict) and depth else ():
+        yield from _lists_of_frames(inner, depth - 1)

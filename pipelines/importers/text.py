@@ -91,7 +91,7 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
     ]
     if not lines:
         remedy = "record again, or copy the file again"
-        raise InputRejected("F01", "no line of numbers in the file", where=source, remedy=remedy)
+        raise InputRejected("F01", "no line of numbers in the file", source, remedy)
     dialect = _dialect(lines, source, given)
     if dialect.width >= max(TEXT.long_side * len(lines), TEXT.fewest_long) and given.header is None:
         return _along_the_lines(lines, dialect, source)
@@ -100,17 +100,16 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
         first = next(name for k, name in enumerate(names) if name in names[:k])
         at = ", ".join(str(k) for k, name in enumerate(names, start=1) if name == first)
         message, where = f"columns {at} are all named '{first[:80]}'", f"{source}, line {header}"
-        remedy = "give each its own name in the file"
-        raise InputRejected("S03", message, where=where, remedy=remedy)
+        raise InputRejected("S03", message, where, "give each its own name in the file")
     if not body:
-        raise InputRejected("T08", "a header, but no sample", where=source, remedy="record again")
+        raise InputRejected("T08", "a header, but no sample", source, "record again")
     table = _whole_lines(body, text.endswith("\n"), dialect, names, source)
     above = [line.strip("#%/ ,;\t") for number, line in every[: body[0][0] - 1] if number != header]
     kept = {name: x for name, x in table.columns.items()
             if not (name.startswith("column_") and np.isnan(x).all())}  # fmt: skip
     if not kept:
         remedy = "rrrid import reads CSV and text tables, MAT (v5, v7.3) and NPY"
-        raise InputRejected("F16", "no column of numbers", where=source, remedy=remedy)
+        raise InputRejected("F16", "no column of numbers", source, remedy)
     return replace(
         table,
         columns=kept,
@@ -132,8 +131,7 @@ def _decode(data: bytes, source: str, encoding: str | None) -> tuple[str, list[C
         if encoding != "utf-8":
             mark = " (byte order mark)" if data.startswith(_MARKS) else ""
             remedy = "give encoding under [format] if that is wrong"
-            message = f"read as {encoding}{mark}"
-            checks.append(Check.of("F16", "warn", message, where=source, remedy=remedy))
+            checks.append(Check.of("F16", "warn", f"read as {encoding}{mark}", source, remedy))
     if encoding.lower().replace("_", "-").startswith("utf-16"):
         data = data[: len(data) // 2 * 2]
     else:
@@ -141,16 +139,16 @@ def _decode(data: bytes, source: str, encoding: str | None) -> tuple[str, list[C
         if len(data) < whole:
             message = f"{whole - len(data)} NUL bytes at the end left out: the recorder lost its "
             remedy, message = "let the recorder close its file", f"{message}power"
-            checks.append(Check.of("F09", "repair", message, where=source, remedy=remedy))
+            checks.append(Check.of("F09", "repair", message, source, remedy))
         if (at := data.find(b"\0")) >= 0:
             message = f"a NUL byte in line {data[:at].count(10) + 1}"
             remedy = "the file is damaged or not text; export it again"
-            raise InputRejected("F16", message, where=source, remedy=remedy)
+            raise InputRejected("F16", message, source, remedy)
     try:
         text = data.decode(encoding)
     except (UnicodeDecodeError, LookupError) as problem:
         message, remedy = f"not text in {encoding}: {problem}", "give its encoding under [format]"
-        raise InputRejected("F16", message, where=source, remedy=remedy) from None
+        raise InputRejected("F16", message, source, remedy) from None
     return text.replace("\r\n", "\n").replace("\r", "\n"), checks
 
 
@@ -172,7 +170,7 @@ def _encoding_of(data: bytes, source: str) -> str:
             "text in an unknown encoding",
             "save it as UTF-8, or give [format] encoding",
         )
-        raise InputRejected("F16", message, where=source, remedy=remedy) from None
+        raise InputRejected("F16", message, source, remedy) from None
     return "utf-8"
 
 
@@ -190,7 +188,7 @@ def _dialect(lines: list[Line], source: str, given: TextFormat) -> Dialect:
     pairs = [(a, b) for a in delimiters for b in decimals if a != b]
     if not pairs:
         remedy = "give delimiter and decimal under [format]"
-        raise InputRejected("F16", "no delimiter fits", where=source, remedy=remedy)
+        raise InputRejected("F16", "no delimiter fits", source, remedy)
     scored = []
     for delimiter, decimal in pairs:
         form = Dialect(delimiter, decimal, 0)
@@ -208,11 +206,11 @@ def _dialect(lines: list[Line], source: str, given: TextFormat) -> Dialect:
         cells = f"line {number} has {dialect.width} cells under {names} names"
         message = f"{cells}: comma is both delimiter and decimal sign"
         remedy = "export with a semicolon or tab between the columns, or with decimal points"
-        raise InputRejected("F16", message, where=source, remedy=remedy)
+        raise InputRejected("F16", message, source, remedy)
     if dialect.width > TEXT.widest:
         message = f"{dialect.width} cells in a line: not a table of columns"
         remedy = "give delimiter and decimal under [format], or one row a sample"
-        raise InputRejected("F16", message, where=source, remedy=remedy)
+        raise InputRejected("F16", message, source, remedy)
     return dialect
 
 
@@ -231,12 +229,12 @@ def _unusual(
         sign = "comma" if dialect.decimal == "," else "point"
         words = f"{_DELIMITERS.get(dialect.delimiter, dialect.delimiter)}, decimal {sign}"
         message, remedy = f"read as: {words}", "say so under [format] to be sure"
-        checks.append(Check.of("F16", "warn", message, where=source, remedy=remedy))
+        checks.append(Check.of("F16", "warn", message, source, remedy))
     skipped = [number for number, _ in lines if number < body[0][0] and number < header]
     if skipped:
         message = f"{len(skipped)} lines before the table left out"
         remedy, where = "give header or comment under [format]", f"{source}, line {skipped[0]}"
-        checks.append(Check.of("F16", "warn", message, where=where, remedy=f"{remedy} if not so"))
+        checks.append(Check.of("F16", "warn", message, where, f"{remedy} if not so"))
     return checks
 
 
@@ -279,7 +277,7 @@ def _header(
             if n in plain and abs(split - width) == 1 and not (units or best) and split > 1:
                 message, where = f"{split} names above {width} columns", f"{source}, line {n}"
                 remedy = "correct the header, or give [format] header = false and columns by number"
-                raise InputRejected("F16", message, where=where, remedy=remedy)
+                raise InputRejected("F16", message, where, remedy)
             continue
         said = [cell.strip("[]() ") for cell in cells]
         known = [c for c in said if c not in ("", "-", "1")]
@@ -338,13 +336,11 @@ def _whole_lines(
         torn.add(len(body) - 1)
         message = "the last line has no line end: whether its last number is whole is not known, "
         where, remedy = f"{source}, line {body[-1][0]}", "end the recording before it is copied"
-        checks.append(
-            Check.of("F09", "warn", f"{message}it is left out", where=where, remedy=remedy)
-        )
+        checks.append(Check.of("F09", "warn", f"{message}it is left out", where, remedy))
     good = [i for i in range(len(body)) if i not in torn]
     if not good:
         remedy = "record again, or copy the file again"
-        raise InputRejected("T08", "no whole line of numbers", where=source, remedy=remedy)
+        raise InputRejected("T08", "no whole line of numbers", source, remedy)
     table, wrong = _columns([body[i] for i in good], dialect, names, source)
     damage |= {good[k]: reason for k, reason in wrong.items()}
     if damage:
@@ -355,10 +351,9 @@ def _whole_lines(
         if len(damage) > few:
             message = f"{share} are out of step with the columns: {listed}"
             remedy = "export the file again, or cut the damaged part out"
-            raise InputRejected("F09", message, where=source, remedy=remedy)
+            raise InputRejected("F09", message, source, remedy)
         remedy = "copy or export the file again to have them all"
-        message = f"{share} left out: {listed}"
-        checks.append(Check.of("F09", "repair", message, where=source, remedy=remedy))
+        checks.append(Check.of("F09", "repair", f"{share} left out: {listed}", source, remedy))
     keep = [k for k in range(len(good)) if k not in wrong]
     rows = np.array([good[k] for k in keep], dtype=np.int64)
     return replace(
@@ -415,7 +410,7 @@ def _refuse_formula(cell: str, column: str, line: int, source: str) -> None:
     if _FORMULA.fullmatch(cell):
         message = f"'{cell[:30]}' in column '{column}' is a spreadsheet's formula or error"
         remedy = "export the recording itself, not an edited sheet"
-        raise InputRejected("F16", message, where=f"{source}, line {line}", remedy=remedy)
+        raise InputRejected("F16", message, f"{source}, line {line}", remedy)
 
 
 def _clock_times(cells: Any) -> Array | None:
@@ -447,9 +442,9 @@ def _along_the_lines(lines: list[Line], dialect: Dialect, source: str) -> RawTab
     rows = [dialect.cells(line) for _, line in lines]
     length = min(len(row) - (not row[-1]) for row in rows)
     turned = ("\t".join(column) for column in zip(*(row[:length] for row in rows), strict=True))
-    given = TextFormat(delimiter="\t", decimal=dialect.decimal)
+    given = TextFormat(delimiter="\t", decimal="," if dialect.decimal == "," else ".")
     table = read_text(("\n".join(turned) + "\n").encode(), source, given)
     message = f"{len(rows)} lines of {length} cells, read with time along the line"
     remedy = "store one line a sample"
-    check = Check.of("S11", "warn", message, where=source, remedy=remedy)
+    check = Check.of("S11", "warn", message, source, remedy)
     return replace(table, lines=None, checks=(check, *table.checks))

@@ -52,13 +52,13 @@ def drive_of(spec: DriveSpec, robot: RobotDescription, where: object) -> Drive |
         if len(rows) != n or any(isinstance(row, tuple) and len(row) != n for row in rows):
             message = f"drive.transmission must hold {n} gear ratios, or {n} rows of {n} numbers"
             remedy = "write the gear ratio of each joint, or the matrix N of q_motor = N q_joint"
-            raise UsageError("C02", message, where=where, remedy=remedy)
+            raise UsageError("C02", message, where, remedy)
         unit = np.eye(n)
         pairs = zip(rows, unit, strict=True)
         square = np.array([row if isinstance(row, tuple) else row * e for row, e in pairs])
         if abs(np.linalg.det(square)) < RECIPE.singular:
             message, remedy = "drive.transmission cannot be inverted", "each joint needs a motor"
-            raise UsageError("C02", message, where=where, remedy=remedy)
+            raise UsageError("C02", message, where, remedy)
         matrix = tuple(map(tuple, square.tolist()))
     if spec.torque_constant is not None:
         numbers = _per_joint(spec.torque_constant, n, "drive.torque_constant", where)
@@ -74,7 +74,7 @@ def _per_joint(value: Numbers, n: int, what: str, where: object) -> Array:
     """
     if isinstance(value, tuple) and len(value) != n:
         message = f"{what} holds {len(value)} numbers, the robot has {n} joints"
-        raise UsageError("C02", message, where=where, remedy="one number, or one a joint")
+        raise UsageError("C02", message, where, "one number, or one a joint")
     return np.broadcast_to(np.asarray(value, dtype=np.float64), (n,)).copy()
 
 
@@ -106,23 +106,23 @@ def unit_declared(
             known = UNITS.get(canonical_unit(header or "")), UNITS.get(canonical_unit(unit))
             if None not in known and known[0] != known[1]:
                 message = f"the header says '{header}', the recipe says '{unit}'"
-                raise InputRejected("S05", message, where=where, remedy="correct one of them")
+                raise InputRejected("S05", message, where, "correct one of them")
         return units, checks
     given = [header for header in headers if header is not None]
     if given and (len(set(given)) == 1 or len(given) == len(columns)):
         message = f"unit '{', '.join(dict.fromkeys(given))}' taken from the header"
         units = tuple(header or given[0] for header in headers)
-        return units, [Check.of("S06", "ok", message, where=where)]
+        return units, [Check.of("S06", "ok", message, where)]
     wanted = own_units(name, robot)
     if not assume:
         words = f'"{wanted[0]}"' if len(set(wanted)) == 1 else json.dumps(wanted)
         message = f"no unit; say what the numbers of {name} are in"
         remedy = f"add unit = {words} (or what it is) to signals.{name}"
         remedy += ", or pass --assume-units if they are SI"
-        raise InputRejected("S04", message, where=where, remedy=remedy)
+        raise InputRejected("S04", message, where, remedy)
     message = f"no unit; taken as {', '.join(dict.fromkeys(wanted))}, as --assume-units says"
     remedy = "write the unit in the recipe"
-    return wanted, [Check.of("S04", "warn", message, where=where, remedy=remedy)]
+    return wanted, [Check.of("S04", "warn", message, where, remedy)]
 
 
 def units_of_recipe(
@@ -140,7 +140,7 @@ def units_of_recipe(
     if isinstance(spec.unit, tuple):
         if len(spec.unit) != n:
             message = f"signals.{name}.unit holds {len(spec.unit)} units, the robot has {n} joints"
-            raise UsageError("C02", message, where=where, remedy="one unit, or one a joint")
+            raise UsageError("C02", message, where, "one unit, or one a joint")
         return spec.unit, []
     unit = canonical_unit(spec.unit or "")
     own = own_units(name, robot)
@@ -150,7 +150,7 @@ def units_of_recipe(
     other = ", ".join(f"{x} for joint {j} '{joint.name}'" for j, (x, joint) in joints if x != unit)
     message = f"'{unit}' declared for turning and sliding joints: taken as SI, {other}"
     remedy = f"write unit = {json.dumps(own)} in signals.{name}"
-    return own, [Check.of("S05", "warn", message, where=where, remedy=remedy)]
+    return own, [Check.of("S05", "warn", message, where, remedy)]
 
 
 def si_of(units: Sequence[str], spec: SignalSpec) -> float:
@@ -202,8 +202,7 @@ def joint_side(
         if not joint.revolute and span > RECIPE.beyond * (high - low):
             message = f"moves over {span:.4g} m, its limits are {low:.4g} to {high:.4g} m: looks "
             remedy = 'declare unit = "mm" for this joint, one unit a joint'
-            where, message = part.column("q", j), f"{message}like mm"
-            raise InputRejected("S07", message, where=where, remedy=remedy)
+            raise InputRejected("S07", f"{message}like mm", part.column("q", j), remedy)
     return done
 
 
@@ -242,7 +241,7 @@ def _unwrapped(
         at = part.listed(np.flatnonzero(turns[:, joint]) + 1)
         message, where = f"{rollovers} ({at})", part.column(name, int(joint))
         remedy = "let the recorder count turns"
-        done.checks.append(Check.of("D07", "warn", message, where=where, remedy=remedy))
+        done.checks.append(Check.of("D07", "warn", message, where, remedy))
         done.altered.append(f"{name} of joint {joint + 1}: {rollovers}")
     zero = np.zeros((1, raw.shape[1]))
     return raw - wrap * np.concatenate([zero, np.cumsum(turns, axis=0)])
@@ -268,7 +267,7 @@ def _in_si(
         if unit in ("counts", "counts/s") and quantity in ("position", "velocity"):
             if spec.counts_per_rev is None:
                 message, remedy = "counts without counts_per_rev", "add counts_per_rev to signals."
-                raise InputRejected("S05", message, where=where, remedy=f"{remedy}{name}")
+                raise InputRejected("S05", message, where, f"{remedy}{name}")
             what = f"signals.{name}.counts_per_rev"
             turn = _per_joint(spec.counts_per_rev, len(units), what, recipe.where)
             rate = f"{spec.counts_per_rev} counts a revolution"
@@ -279,7 +278,7 @@ def _in_si(
             if constants is None:
                 message = f"{name} is recorded in {unit}, motor current instead of torque"
                 remedy = "add [drive] torque_constant = … [N m/A]"
-                raise InputRejected("S10", message, where=where, remedy=remedy)
+                raise InputRejected("S10", message, where, remedy)
             listed = ", ".join(f"{constants[j]:g}" for j in at)
             done.steps.append(f"{name}: {unit} times {listed} N m/A")
             amperes = UNITS[canonical_unit(unit)].factor * values
@@ -306,7 +305,7 @@ def _excitation(name: str, recipe: Recipe, units: tuple[str, ...], where: str) -
     message += said if law else "the recipe has no [controller]"
     add = 'add [controller] law = "pd" with its gains kp = [ … ] and kd = [ … ]'
     remedy = f"where {name} was added to the torque of a PD controller, {add}"
-    raise InputRejected("S05", message, where=where, remedy=remedy)
+    raise InputRejected("S05", message, where, remedy)
 
 
 def _through_drive(
@@ -315,8 +314,7 @@ def _through_drive(
     """q_joint = N⁻¹ q_motor, tau_joint = Nᵀ tau_motor."""
     if drive is None or drive.transmission is None:
         message = f"'signals.{name}' is on the motor side, but there is no drive.transmission"
-        remedy = "add [drive] transmission = the gear ratios"
-        raise UsageError("C02", message, where=where, remedy=remedy)
+        raise UsageError("C02", message, where, "add [drive] transmission = the gear ratios")
     matrix = np.array(drive.transmission)
     to_joint = f"{name}: motor to joint side by the"
     if schema.SIGNALS[name][0] in MOTION:
@@ -336,5 +334,4 @@ def _refuse_wrong_kind(
             each = f"one a joint: unit = {json.dumps(own)}"
             wanted = f"such as {own[j]}" if len(set(own)) == 1 else each
             message = f"'{unit}' for joint {j + 1} '{joint.name}', which is {joint.type}"
-            where, remedy = part.column(name, j), f"declare its unit, {wanted}"
-            raise InputRejected("S05", message, where=where, remedy=remedy)
+            raise InputRejected("S05", message, part.column(name, j), f"declare its unit, {wanted}")
