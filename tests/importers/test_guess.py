@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.recorded_arm import LIFT, THREE, Arm, Run, simulate
+from benchmarks.recorded_arm import THREE, Arm, Run, simulate
 from pipelines.errors import InputRejected, UsageError
 from pipelines.import_log import draft_recipe
 from pipelines.importers.guess import guess_recipe
@@ -46,13 +46,6 @@ def test_a_recording_that_states_its_units_needs_only_its_robot(tmp_path: Path) 
 def test_a_blank_that_is_left_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"RRID-C02.*'robot.use' is still marked FILL IN.*Replace the blank.*at robot.use"):
         run(tmp_path / "data", drafted(tmp_path / "data", text(good())))
-
-
-@pytest.mark.parametrize(("line", "place"), [('rate = "FILL IN"', "time.rate"), ('q = "FILL IN"', "signals.q")])
-def test_any_blank_is_named_with_its_place(line: str, place: str) -> None:
-    section, _, key = place.partition(".")
-    with pytest.raises(UsageError, match=f"RRID-C02.*at {section}.{key}"):
-        parse_recipe(f"[{section}]\n{line}\n")
 
 
 def test_units_in_a_header_are_used_and_sure(tmp_path: Path) -> None:
@@ -101,14 +94,6 @@ def test_holes_do_not_disturb_a_guess(tmp_path: Path, value: float) -> None:
 def test_a_handful_of_samples_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputRejected, match="RRID-T08"):
         drafted(tmp_path, "\n".join(text(good()).splitlines()[:6]) + "\n")
-
-
-def test_names_that_are_toml_are_quoted(tmp_path: Path) -> None:
-    columns = good()
-    odd = {"t": columns["t"], 'pos "1" \\ (rad)': columns["q_1"], "tau #1 (Nm)": columns["tau_1"]}
-    draft = guess_recipe(write(tmp_path, text(odd).replace('pos "1"', "pos '1'")))
-    text_ = draft.text.replace("FILL IN", "rrr")
-    assert parse_recipe(text_).signals["q"].column
 
 
 def test_nanoseconds_since_1970_are_a_time(tmp_path: Path) -> None:
@@ -183,12 +168,6 @@ def test_a_torque_with_an_unexplained_word_is_asked_about(tmp_path: Path, name: 
     assert 'tau = { columns = "FILL IN", unit = "FILL IN" }' in drafted(tmp_path, text(named))
 
 
-def test_joints_named_in_a_comment_give_the_order(tmp_path: Path) -> None:
-    names = ", ".join(reversed(THREE.joints))
-    draft = _arm(tmp_path, lambda run: _block("q#", run.q[:, ::-1]) | _block("tau#", run.tau[:, ::-1]), head=f"# joints: {names}\n")
-    assert 'q = { columns = ["q3", "q2", "q1"], unit = "rad" }' in draft
-
-
 def test_joints_named_in_a_list_of_a_parquet_file_give_the_order(tmp_path: Path) -> None:
     """Nanoseconds since 1970 are beyond 2^53, and rounded to far less than a step: they are the clock."""
     moved = simulate(THREE, seed=3)
@@ -210,14 +189,6 @@ def test_a_plan_is_no_measurement(tmp_path: Path, name: str, clock: str) -> None
     assert "the points of a plan: what was measured?" in draft
 
 
-def test_a_list_of_names_in_one_cell_orders_the_joints(tmp_path: Path) -> None:
-    """As a message of ROS holds them, in an order that is not the robot's."""
-    rows = text(good()).splitlines()
-    content = "\n".join([f"name,{rows[0]}", *(f"\"['c', 'a', 'b']\",{row}" for row in rows[1:])]) + "\n"
-    (tmp_path / "arm.urdf").write_text(ABC.urdf())
-    assert 'q = { columns = ["q_2", "q_3", "q_1"],' in drafted(tmp_path, content)
-
-
 def test_rows_with_the_newest_first_are_refused(tmp_path: Path) -> None:
     """Torque against a motion that runs backwards would have its friction reversed."""
     with pytest.raises(InputRejected, match=r"RRID-T01.*newest row is first.*Sort the rows"):
@@ -230,18 +201,6 @@ def test_the_torque_proves_the_unit_of_positions_without_a_velocity(tmp_path: Pa
     load = 55.0 if unit == "FILL IN" else 1.0
     draft = _arm(tmp_path, lambda run: _block("position #", run.q * factor) | _block("torque #", run.tau / load))
     assert f'q = {{ columns = "position {{j}}", unit = "{unit}" }}' in draft
-
-
-def test_a_current_in_a_rms_keeps_its_unit_and_asks_for_the_constant(tmp_path: Path) -> None:
-    draft = _arm(tmp_path, lambda run: _block("pos_# [rad]", run.q) | _block("I_# [Arms]", run.current))
-    assert 'columns = "I_{j}", unit = "Arms"' in draft
-    assert 'torque_constant = "FILL IN"' in draft
-
-
-def test_a_velocity_that_is_not_imported_is_named(tmp_path: Path) -> None:
-    moved = simulate(Arm("pendulum", ("joint",), "y", (30,)), seed=3)
-    columns = {"t": moved.t, "q": moved.q[:, 0], "dq": moved.dq[::-1, 0], "tau": moved.tau[:, 0]}
-    assert '# left out, a velocity: column = "dq"' in drafted(tmp_path, text(columns))
 
 
 @pytest.mark.parametrize(("name", "quantity"), [("time_index", "index"), ("timestep", "index"), ("sample_time", "time"),
@@ -257,46 +216,6 @@ def test_a_unit_with_its_prefix_is_one_word(name: str, unit: str) -> None:
     assert read_name(name).unit == unit
 
 
-def test_a_turning_joint_behind_a_sliding_one_has_a_velocity_of_its_own_unit(tmp_path: Path) -> None:
-    moved = simulate(LIFT, seed=3)
-    (tmp_path / "arm.urdf").write_text(LIFT.urdf())
-    columns = {"t [s]": moved.t}
-    for j, (factor, unit) in enumerate([(1e3, "mm"), *[(180 / np.pi, "deg")] * 3]):
-        columns[f"q{j + 1} [{unit}]"] = factor * moved.q[:, j]
-        columns[f"dq{j + 1} [{unit}/s]"] = factor * moved.dq[:, j]
-        columns[f"tau{j + 1} [{'N m' if j else 'N'}]"] = moved.tau[:, j]
-    draft = draft_recipe(write(tmp_path, text(columns))).text
-    assert 'unit = ["mm", "deg", "deg", "deg"]' in draft
-
-
-@pytest.mark.parametrize("orient", ["columns", "split", "records"])
-def test_a_frame_that_pandas_wrote_as_json_is_read(tmp_path: Path, orient: str) -> None:
-    pd.DataFrame(good()).to_json(tmp_path / "run.json", orient=orient)
-    assert guess_recipe(tmp_path / "run.json").blanks == ("robot.use", "signals.q.unit", "signals.tau.unit")
-
-
-def test_a_table_of_records_in_hdf5_is_read_like_named_columns(tmp_path: Path) -> None:
-    import h5py
-
-    columns = good()
-    records = np.zeros(len(columns["t"]), [("t", "f8"), ("state", "S4"), ("q", "f8", 3), ("tau", "f8", 3)])
-    records["t"] = columns["t"]
-    for signal in ("q", "tau"):
-        records[signal] = np.column_stack([columns[f"{signal}_{j}"] for j in (1, 2, 3)])
-    with h5py.File(tmp_path / "run.h5", "w") as file:
-        file["session/samples"] = records
-    draft = guess_recipe(tmp_path / "run.h5")
-    assert 'q = { columns = "session.samples.q_{j}"' in draft.text
-    assert draft.blanks == ("robot.use", "signals.q.unit", "signals.tau.unit")
-
-
-def test_a_held_torque_is_drafted_as_a_command(tmp_path: Path) -> None:
-    columns = good()
-    named = {("tau_cmd_" + k[-1] if k.startswith("tau") else k): v for k, v in columns.items()}
-    assert 'torque = "held-command"' in drafted(tmp_path, text(named))
-    assert 'torque = "measured"   # check: unsure' in drafted(tmp_path, text(columns))
-
-
 def test_the_odrive_draft_is_the_shipped_recipe(shared: Path) -> None:
     draft = guess_recipe(shared / "real" / "odrive" / "slow2_nocomp_0.csv")
     assert draft.blanks == ("robot.use", "signals.q.counts_per_rev", "drive.torque_constant")
@@ -307,13 +226,6 @@ def test_the_odrive_draft_is_the_shipped_recipe(shared: Path) -> None:
     assert recipe.signals["tau"].unit == "A"
     assert recipe.resample is not None
     assert recipe.resample.rate == 400.0
-
-
-def test_words_that_come_once_a_joint_are_a_signal_each(tmp_path: Path) -> None:
-    """pyfri: a word that comes once, as dt, does not make one group of all that no word explains."""
-    draft = _arm(tmp_path, lambda run: _block("mp#", run.q) | _block("mt#", run.tau) | {"dt": np.full(len(run.t), 0.005)})
-    assert 'candidate: columns = "mp{j}"' in draft
-    assert 'candidate: columns = "mt{j}"' in draft
 
 
 def test_degrees_that_the_torque_proves_to_be_radians_are_a_blank(tmp_path: Path) -> None:

@@ -26,16 +26,6 @@ def test_s01_a_missing_column_is_named_with_its_neighbour() -> None:
         expand(columns("Joint_1", "Joint2", "Joint_3"), "Joint_{j}", 3, "q")
 
 
-def test_s01_map_puts_another_column_in_its_place() -> None:
-    assert expand(columns("Joint_1", "Joint2", "Joint_3"), "Joint_{j}", 3, "q", {2: "Joint2"}) == ("Joint_1", "Joint2", "Joint_3")
-
-
-@pytest.mark.parametrize("chosen", ["q_{j}", ("q_1", "q_2", "q_3", "q_4")])
-def test_s02_more_columns_than_joints_are_refused(chosen: str | tuple[str, ...]) -> None:
-    with pytest.raises(InputRejected, match=r"RRID-S02.*4 columns for q, but the robot has 3 joints"):
-        expand(columns("q_1", "q_2", "q_3", "q_4"), chosen, 3, "q")
-
-
 def recipe(edit: Callable[[str], str] = lambda text: text, more: str = "") -> Recipe:
     return parse_recipe(edit(RECIPE) + more)
 
@@ -58,23 +48,11 @@ def test_joint_power_equals_motor_power_sample_by_sample() -> None:
     assert np.abs(joint_power - motor_power).max() < 1e-12 * np.abs(motor_power).max()
 
 
-def test_gear_ratios_alone_are_a_diagonal_matrix() -> None:
-    joint = convert(recording(), recipe(more="[drive]\ntransmission = [10.0, 20.0, -30.0]\n"))
-    assert np.allclose(joint["q"] * [10.0, 20.0, -30.0], recording().signals["q"], rtol=1e-14, atol=0)
-    assert np.allclose(joint["tau"] / [10.0, 20.0, -30.0], recording().signals["tau"], rtol=1e-14, atol=0)
-
-
 @pytest.mark.row("S10")
 def test_current_becomes_torque_and_is_kept() -> None:
     joint = convert(recording(), recipe(lambda s: s.replace('"N m"', '"mA"'), "[drive]\ntorque_constant = [0.1, 0.2, 0.3]\n"))
     assert np.allclose(joint["current"], 1e-3 * recording().signals["tau"], rtol=1e-15, atol=0)
     assert np.allclose(joint["tau"], joint["current"] * [0.1, 0.2, 0.3], rtol=1e-15, atol=0)
-
-
-@pytest.mark.row("S10")
-def test_s10_current_without_constant_is_refused() -> None:
-    with pytest.raises(InputRejected, match=r"RRID-S10.*motor current instead of torque.*torque_constant"):
-        convert(recording(), recipe(lambda s: s.replace('"N m"', '"A"')))
 
 
 @pytest.mark.parametrize(("wrong", "right"), [("V", "N m"), ("deg", "N m")])

@@ -17,7 +17,7 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.importers.npy import read_npy
 from pipelines.importers.raw import expand, table_of
 from pipelines.importers.tables import read_table
-from tests.importers.good import good, text
+from tests.importers.good import good
 
 
 def signals() -> dict[str, np.ndarray[Any, Any]]:
@@ -79,19 +79,6 @@ def test_mat73_is_read_exactly(tmp_path: Path) -> None:
     assert_good(mat73(tmp_path / "run.mat"))
 
 
-def test_f06_a_mat_file_of_another_name_is_read_with_a_warning(tmp_path: Path) -> None:
-    path = mat5(tmp_path / "run.mat", signals())
-    path.rename(tmp_path / "run.csv")
-    assert [c.code for c in read_table(tmp_path / "run.csv").checks] == ["RRID-F06"]
-
-
-def test_f06_text_named_mat_is_read_with_a_warning(tmp_path: Path) -> None:
-    (tmp_path / "run.mat").write_text(text(good()))
-    table = read_table(tmp_path / "run.mat")
-    assert [c.code for c in table.checks] == ["RRID-F06"]
-    assert np.array_equal(table.columns["q_1"], good()["q_1"])
-
-
 @pytest.mark.parametrize("share", [0.02, 0.3, 0.7, 0.999])
 @pytest.mark.parametrize("version", ["5", "5z", "7.3"])
 def test_f08_a_truncated_mat_file_is_refused_in_one_way(tmp_path: Path, version: str, share: float) -> None:
@@ -101,12 +88,6 @@ def test_f08_a_truncated_mat_file_is_refused_in_one_way(tmp_path: Path, version:
     path.write_bytes(whole[: max(130, int(share * len(whole)))])
     with pytest.raises(InputRejected, match="RRID-(F08 run.mat: truncated or damaged MAT file|S12)"):
         read_table(path)
-
-
-def test_s12_complex_numbers_are_no_signal(tmp_path: Path) -> None:
-    table = read_table(mat5(tmp_path / "run.mat", signals() | {"z": 1j * signals()["t"]}))
-    with pytest.raises(InputRejected, match="RRID-S12.*'z'.*complex"):
-        table.name_of("z")
 
 
 def test_s12_integers_beyond_the_mantissa_are_refused() -> None:
@@ -119,39 +100,6 @@ def test_s11_a_matrix_that_lies_on_its_side_is_turned() -> None:
     table = table_of({"q": signals()["q"].T}, "run.npy")
     assert np.array_equal(table.columns["q_3"], good()["q_3"])
     assert [(c.code, c.level) for c in table.checks] == [("RRID-S11", "warn")]
-
-
-def test_s11_a_matrix_of_gains_beside_signals_is_no_signal() -> None:
-    table = table_of({"q": signals()["q"], "gains": np.eye(3)}, "run.npy")
-    assert list(table.columns) == ["q_1", "q_2", "q_3"]
-
-
-def test_x07_an_array_of_objects_costs_itself_alone(tmp_path: Path) -> None:
-    np.savez(tmp_path / "run.npz", contacts=np.array({}), **signals())
-    table = read_table(tmp_path / "run.npz")
-    assert np.array_equal(table.columns["q_3"], good()["q_3"])
-    assert table.text == {"contacts": "objects or cells"}
-
-
-@pytest.mark.parametrize("version", ["5", "7.3"])
-def test_a_timeseries_of_vectors_is_a_matrix_and_cells_and_pictures_are_named(tmp_path: Path, version: str) -> None:
-    path, q, named = tmp_path / "run.mat", np.arange(300.0).reshape(100, 3), {"jPos": "objects or cells"}
-    stacked = {"q": q.T[:, None, :], "t": np.arange(100.0)}
-    if version == "5":
-        mat5(path, stacked | {"jPos": q.astype(object)})
-    else:
-        named |= {"camera": "an array of 3 dimensions"}
-        with h5py.File(path, "w") as file:
-            file.update({name: values.T for name, values in stacked.items()} | {"camera": np.zeros((100, 4, 5), np.uint8)})
-            file.create_dataset("jPos", data=[[0]]).attrs["MATLAB_class"] = b"cell"
-    table = read_table(path)
-    assert np.array_equal(np.column_stack([table.columns[f"q_{j}"] for j in (1, 2, 3)]), q)
-    assert table.text == named
-
-
-def test_s11_another_motion_in_the_same_file_is_named() -> None:
-    table = table_of({"q": np.zeros((400, 2)), "tau": np.ones((400, 2)), "q_test": np.zeros((90, 2))}, "run.mat")
-    assert [check.message for check in table.checks] == ["left out, not of 400 samples: 'q_test'"]
 
 
 def test_x12_an_npz_archive_is_read_and_one_of_other_files_is_not(tmp_path: Path) -> None:
@@ -232,27 +180,7 @@ def test_npy_fields_are_read_by_name(tmp_path: Path) -> None:
     assert_good(tmp_path / "run.npy")
 
 
-@pytest.mark.parametrize("order", ["C", "F"])
-def test_npy_columns_are_read_by_number(order: Any) -> None:
-    table = table_of(read_npy(npy(np.asarray(signals()["q"], order=order)), "run.npy"), "run.npy")
-    assert np.array_equal(table.columns[table.name_of(2)], good()["q_2"])
-
-
 def test_f02_a_truncated_npy_file_says_how_much_is_there() -> None:
     content = npy(signals()["q"])
     with pytest.raises(InputRejected, match=rf"RRID-F02.*{len(content) - 9} of {len(content)} bytes"):
         read_npy(content[:-9], "run.npy")
-
-
-def test_x05_a_header_that_declares_too_much_is_refused() -> None:
-    content = npy(signals()["q"]).replace(b"(1200, 3)", b"(9**99,3)").replace(b"9**99", b"99999")
-    with pytest.raises(InputRejected, match="RRID-F02"):
-        read_npy(content, "run.npy")
-
-
-def test_the_samples_are_the_side_that_most_arrays_share() -> None:
-    """A wide array of features beside short signals: 50 samples of them, not 512 of one row each."""
-    rng = np.random.default_rng(1)
-    table = table_of({"t": np.arange(50.0), "q": rng.normal(size=(50, 3)), "image": rng.normal(size=(50, 512))}, "run.npz")
-    assert list(table.columns) == ["t", "q_1", "q_2", "q_3"]
-    assert table.rows.size == 50
