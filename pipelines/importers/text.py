@@ -11,6 +11,7 @@ out, because its last number may be cut. pandas reads the lines that are whole.
 from __future__ import annotations
 
 import codecs
+import contextlib
 import csv
 import io
 import re
@@ -62,8 +63,10 @@ class Dialect:
         if self.delimiter == "":
             return [line.strip().strip('"')]
         if '"' in line:
-            line = re.sub(r"\s+", " ", line.strip()) if self.delimiter == " " else line
-            return [cell.strip() for cell in next(csv.reader([line], delimiter=self.delimiter), [])]
+            spaced = re.sub(r"\s+", " ", line.strip()) if self.delimiter == " " else line
+            with contextlib.suppress(csv.Error):  # a cell without end
+                cells = next(csv.reader([spaced], delimiter=self.delimiter), [])
+                return [cell.strip() for cell in cells]
         return [cell.strip() for cell in line.split(self.delimiter.strip(" ") or None)]
 
     def is_number(self, cell: str) -> bool:
@@ -373,12 +376,18 @@ def _columns(
     import pandas as pd
 
     separator = {" ": r"\s+", "": _NOWHERE}.get(dialect.delimiter, dialect.delimiter)
-    frame = pd.read_csv(
-        io.StringIO("\n".join(line for _, line in lines)),
-        sep=separator, decimal=dialect.decimal, header=None, names=range(dialect.width),
-        index_col=False, na_values=sorted(MISSING), keep_default_na=False, skipinitialspace=True,
-        skip_blank_lines=False, low_memory=False,
-    )  # fmt: skip
+    try:
+        frame = pd.read_csv(
+            io.StringIO("\n".join(line for _, line in lines)),
+            sep=separator, decimal=dialect.decimal, header=None, names=range(dialect.width),
+            index_col=False, na_values=sorted(MISSING), keep_default_na=False,
+            skipinitialspace=True, skip_blank_lines=False, low_memory=False,
+        )  # fmt: skip
+    except (ValueError, OverflowError) as problem:
+        message = f"no table of numbers: {problem}"
+        raise InputRejected("F16", message, source, "export the table again") from None
+    if len(frame) != len(lines):
+        raise InputRejected("F16", "quotes that do not end", source, "export the table again")
     columns, units, text = dict[str, Array](), dict[str, str](), dict[str, str]()
     wrong: dict[int, str] = {}
     for name, (_, cells) in zip(names, frame.items(), strict=True):
