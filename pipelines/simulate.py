@@ -37,7 +37,7 @@ _NAME_ONE = "name one: --replay LOG"
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(How):
     """Choose the model, its faults, and how the logs are imitated."""
 
     model: str = option("", "The model.json of estimate-bps, or the shipped 'rrr'.", "MODEL")
@@ -47,22 +47,6 @@ class Settings:
         "listed below; a wrong NAME is refused with a list of the right ones.",
         causes=True,
     )
-    replicas: int = option(1, "Simulations that differ in their noise; windows have one.")
-    seed: int = option(1, "Seed of the first one's noise.")
-    noise: tuple[float, ...] = option(
-        (),
-        "Torque noise of the drives, std [N m], one or one a joint: 0.02,0.01,0.005. Windows have "
-        "none. [0]",
-    )
-    windowed: bool = option(False, "In short windows, though the controller is known.")
-    window: float = option(0.1, "Length of such a window [s].")
-    steps: int | None = option(
-        None, "Runge-Kutta steps a sample; 1 to 1000. [as few as the error allows]"
-    )
-
-    @property
-    def how(self) -> How:
-        return How(self.replicas, self.seed, self.noise, self.windowed, self.window, self.steps)
 
 
 @dataclass(frozen=True)
@@ -125,7 +109,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         if opened.log.origin != "planned":
             checks += accepted(Subject(recording(opened.log)))
         drawn = len(found) < REPORT.simulated
-        one = imitate(opened.log, arm, settings.how, f"logs/{stem}", recorded, drawn)
+        one = imitate(opened.log, arm, settings, f"logs/{stem}", recorded, drawn)
         found.append(replace(one, source=opened.path.name))
     pairs = zip(inputs.logs, found, strict=True)
     return Result(

@@ -28,7 +28,7 @@ def simulated(log: ExperimentLog, tmp_path: Path, settings: Settings, format: st
 
 def test_the_true_model_differs_by_noise_alone(tmp_path: Path) -> None:
     """Closed loop, same noise level: the bench's arm and ours are as far apart as two of ours."""
-    outcome = simulated(controlled_log(SAMPLES), tmp_path, Settings("rrr", noise=TORQUE_NOISE, replicas=3))
+    outcome = simulated(controlled_log(SAMPLES), tmp_path, Settings(model="rrr", noise=TORQUE_NOISE, replicas=3))
     [found] = outcome.result.logs
     assert (found.simulation, found.replicas, len(found.logs)) == ("closed-loop", 3, 3)
     assert found.noise_rms is not None
@@ -40,14 +40,14 @@ def test_the_true_model_differs_by_noise_alone(tmp_path: Path) -> None:
 def test_the_simulated_log_is_a_log(tmp_path: Path) -> None:
     """Derived from the log it imitates: origin, source, controller and reference; and it can be imitated again."""
     log = controlled_log(SAMPLES)
-    outcome = simulated(log, tmp_path, Settings("rrr"), "parquet")
+    outcome = simulated(log, tmp_path, Settings(model="rrr"), "parquet")
     written = open_log(outcome.folder / "logs" / "waving.parquet").log
     assert (written.origin, written.controller, written.robot_text) == ("simulated", log.controller, log.robot_text)
     assert written.derived is not None
     assert (written.derived.command, written.derived.source_sha256) == ("simulate", digest_of(log))
     assert json.loads(written.derived.settings)["settings"]["model"] == "rrr"
     np.testing.assert_array_equal(written["q_ref"], log["q_ref"])
-    again = simulated(written, tmp_path, Settings("rrr")).result.logs[0]
+    again = simulated(written, tmp_path, Settings(model="rrr")).result.logs[0]
     assert again.steps == outcome.result.logs[0].steps
     assert again.position_max.max() < 1e-12
     assert again.torque_rms.max() < 1e-12
@@ -55,12 +55,12 @@ def test_the_simulated_log_is_a_log(tmp_path: Path) -> None:
 
 def test_without_a_controller_it_is_windows(tmp_path: Path) -> None:
     """The log says nothing of its controller: short windows, no simulated log, and the reason as a check."""
-    outcome = simulated(replace(controlled_log(SAMPLES), controller=None), tmp_path, Settings("rrr", window=0.05))
+    outcome = simulated(replace(controlled_log(SAMPLES), controller=None), tmp_path, Settings(model="rrr", window=0.05))
     [found] = outcome.result.logs
     assert (found.simulation, found.files, found.window, found.torque_rms) == ("windowed", (), 0.05, None)
     assert found.position_rms.max() < 5e-5
     heavy = simulated(replace(controlled_log(SAMPLES), controller=None), tmp_path,
-                      Settings("rrr", ("rotor_inertia:3:inertia=0.02",), window=0.05)).result.logs[0]
+                      Settings(model="rrr", fault=("rotor_inertia:3:inertia=0.02",), window=0.05)).result.logs[0]
     assert heavy.position_rms[2] > 10.0 * found.position_rms[2]
     assert any(check.code == "RRID-S22" and "windows" in check.message for check in outcome.checks)
     assert not (outcome.folder / "logs").exists()
@@ -70,19 +70,19 @@ def test_a_plan_is_simulated_and_compared_with_nothing(tmp_path: Path) -> None:
     """References and controller alone."""
     log = controlled_log(SAMPLES)
     plan = replace(log, origin="planned", signals={k: x for k, x in log.signals.items() if k not in ("q", "tau")})
-    outcome = simulated(plan, tmp_path, Settings("rrr"))
+    outcome = simulated(plan, tmp_path, Settings(model="rrr"))
     [found] = outcome.result.logs
     assert (found.position_rms, found.torque_rms) == (None, None)
     written = open_log(outcome.folder / "logs" / "waving.h5").log
     assert np.abs(written.q - log.q).max() < 1e-3
     with pytest.raises(InputRejected, match="controller") as refused:
-        simulated(replace(plan, controller=None), tmp_path, Settings("rrr"))
+        simulated(replace(plan, controller=None), tmp_path, Settings(model="rrr"))
     assert refused.value.code == "RRID-S22"
 
 
 @pytest.mark.parametrize(("settings", "code"), [
-    (Settings(), "C02"), (Settings("nobody"), "C04"), (Settings("rrr", ("coulom:1:level=1",)), "C01"),
-    (Settings("rrr", noise=(1.0, 2.0)), "C02"), (Settings("rrr", replicas=2), "C02"), (Settings("rrr", window=0.0), "C02"),
+    (Settings(), "C02"), (Settings(model="nobody"), "C04"), (Settings(model="rrr", fault=("coulom:1:level=1",)), "C01"),
+    (Settings(model="rrr", noise=(1.0, 2.0)), "C02"), (Settings(model="rrr", replicas=2), "C02"), (Settings(model="rrr", window=0.0), "C02"),
 ])
 def test_settings_that_do_not_fit_are_refused(settings: Settings, code: str, tmp_path: Path) -> None:
     """With a code and a remedy, and nothing is written."""
@@ -113,6 +113,6 @@ def test_an_open_loop_log_is_compared_in_windows(tmp_path: Path) -> None:
     log = controlled_log(SAMPLES)
     assert log.controller is not None
     friction = replace(log, experiment="friction", joint=3, controller=replace(log.controller, law="open-loop"))
-    [found] = simulated(friction, tmp_path, Settings("rrr")).result.logs
+    [found] = simulated(friction, tmp_path, Settings(model="rrr")).result.logs
     assert (found.simulation, found.law) == ("windowed", "open-loop")
     assert "open loop" in found.reason

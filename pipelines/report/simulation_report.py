@@ -11,20 +11,17 @@ import numpy as np
 from pipelines.report.figures import (
     Array,
     compared_figure,
-    density_figure,
-    joint_colour,
     joint_signal_figure,
-    one_figure,
 )
 from pipelines.report.report import Figure, Report, Section, Table
 from pipelines.report.sections import further_logs
 from pipelines.report.sentences import paragraphs, sentence
-from pipelines.report.style import format_number, format_unit, three_digits
+from pipelines.report.style import format_number, three_digits
 from pipelines.simulation.course import Course
 from pipelines.simulation.imitate import Imitation
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    pass
 
 _say, _paragraphs = partial(sentence, "simulation"), partial(paragraphs, "simulation")
 
@@ -115,15 +112,12 @@ def _section(one: Imitation, course: Course) -> Section:
 
 def _figures(one: Imitation, s: Course) -> list[Figure]:
     unit, name = one.units[0], one.name
-    position = (s.position, s.position_simulated, s.position_difference, s.position_density)
+    position = (s.position, s.position_simulated, s.position_difference)
     figures = _signal_figures(name, "position", unit, s, *position)
-    if s.elapsed is not None and s.drift is not None:
-        draw = partial(draw_drift, elapsed=s.elapsed, drift=s.drift, unit=unit)
-        figures.append(one_figure(f"drift-{name}", _say("drift"), draw, 2.6))
     caption, speed = _say("measured", "speed"), (s.speed, s.speed_simulated)
     figures.append(compared_figure(f"speed-{name}", caption, s.t, *speed, f"speed [{unit}/s]"))
     if s.torque is not None and s.torque_simulated is not None and s.torque_difference is not None:
-        torque = (s.torque, s.torque_simulated, s.torque_difference, s.torque_density)
+        torque = (s.torque, s.torque_simulated, s.torque_difference)
         figures += _signal_figures(name, "torque", one.torque_units[0], s, *torque)
     return figures
 
@@ -136,25 +130,11 @@ def _signal_figures(
     measured: Array,
     simulated: Array,
     difference: Array,
-    density: Array | None,
 ) -> list[Figure]:
-    """A signal measured and simulated, the difference over time, and its spectrum where known."""
+    """A signal measured and simulated, and the difference over time."""
     caption, quantity = _say("measured", name), f"{name} [{unit}]"
     both = compared_figure(f"{name}-{log}", caption, s.t, measured, simulated, quantity)
     caption, quantity = _say("difference", name), "simulated − measured"
     figure_name = f"{name}-difference-{log}"
     error = joint_signal_figure(figure_name, caption, s.t, difference, unit, quantity=quantity)
-    if s.frequency is None or density is None:
-        return [both, error]
-    figure_name, caption = f"{name}-spectrum-{log}", _say("spectrum", name)
-    return [both, error, density_figure(figure_name, caption, s.frequency, density, unit)]
-
-
-def draw_drift(axes: Axes, elapsed: Array, drift: Array, unit: str) -> None:
-    """Rms difference over the time since a window began, one line a joint."""
-    for j, column in enumerate(drift.T):
-        axes.plot(1e3 * elapsed, column, color=joint_colour(j), label=f"joint {j + 1}")
-    axes.set_xlabel("time since the window began [ms]")
-    axes.set_ylabel(f"rms difference [{format_unit(unit)}]")
-    axes.set_ylim(bottom=0.0)
-    axes.legend(loc="upper left")
+    return [both, error]

@@ -44,8 +44,6 @@ class SimulationConfig:
     blocks: int = 20  # of the time over which errors are added up
     # figures
     stretches: int = 500  # of which lowest and highest sample are drawn
-    segment: int = 2048  # samples of a spectrum
-    fewest: int = 64  # samples that make a spectrum
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.io import schema
 from pipelines.io.log import Array, Derived, ExperimentLog, Signal, created, digest_of, recording
+from pipelines.io.option import option
 from pipelines.io.results import NOT_STORED
 from pipelines.simulation.closed_loop import Noise, Simulated, run
 from pipelines.simulation.config import SIMULATION
@@ -33,12 +34,18 @@ __all__ = ["How", "Imitation", "imitate"]
 class How:
     """How to imitate a log."""
 
-    replicas: int = 1
-    seed: int = 1  # of the first replica; the others follow
-    noise: tuple[float, ...] = ()  # [N m] std of the drives' torque noise: one, or one a joint
-    windowed: bool = False  # although the controller is known
-    window: float = 0.1  # [s]
-    steps: int | None = None  # a sample, the body held in none; None: as few as the error allows
+    replicas: int = option(1, "Simulations that differ in their noise; windows have one.")
+    seed: int = option(1, "Seed of the first one's noise.")
+    noise: tuple[float, ...] = option(
+        (),
+        "Torque noise of the drives, std [N m], one or one a joint: 0.02,0.01,0.005. Windows have "
+        "none. [0]",
+    )
+    windowed: bool = option(False, "In short windows, though the controller is known.")
+    window: float = option(0.1, "Length of such a window [s].")
+    steps: int | None = option(
+        None, "Runge-Kutta steps a sample; 1 to 1000. [as few as the error allows]"
+    )
 
     def check(self, n_joints: int) -> None:
         """Refuse a setting that does not fit.
@@ -187,7 +194,7 @@ def _in_windows(
         speed_rms=_rms((windows.dq - motion.dq)[None]),
         steps=windows.steps,
         window=length * log.sample_time,
-        course=course(log, q, dq, None, windows) if draw else None,
+        course=course(log, q, dq, None) if draw else None,
     )
 
 
