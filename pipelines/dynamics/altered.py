@@ -1,14 +1,11 @@
 """The same arm with other gravity, another length, or a body at its tip.
 
-Its base parameters are carried over.
-
     tilted = with_gravity(body, gravity)
     p = carry_over(body, tilted) @ p            the same links, as far as torque tells them
     p = p + tip_parameters(body) @ [m, mx, my, mz, Ixx, …]        of a body held at the tip
 
-Which links lie behind base parameters is not known. Those taken have zero where torque tells
-nothing; what another choice would change lies in the span of the other body's regressor, so that a
-fit of its base parameters makes up for it.
+Of the links behind base parameters those are taken that are zero where torque tells nothing: what
+another choice would change lies in the span of the other body's regressor.
 """
 
 from __future__ import annotations
@@ -67,8 +64,7 @@ def with_gravity(body: RigidBody, gravity: Array) -> RigidBody:
 def with_longer_link(body: RigidBody, link: int, by: float) -> RigidBody:
     """Return the same arm, all beyond link `link` (1-based) `by` [m] further along it.
 
-    Along x of its frame, of a URDF towards the next joint. The link's own body keeps its place on
-    its axis.
+    Along x of its frame, of a URDF towards the next joint; the link's own body keeps its place.
 
     Raises:
         ValueError: nothing is beyond that link.
@@ -90,10 +86,8 @@ def with_longer_link(body: RigidBody, link: int, by: float) -> RigidBody:
 
 
 def carry_over(body: RigidBody, other: RigidBody) -> Array:
-    """Return the base parameters of the same links in the other arm, as a matrix.
-
-    It is (parameters of other, parameters of body).
-    """
+    """Return the base parameters of the same links in the other arm, as a matrix by those of
+    body."""
     shifted = _shifted(chain_of(body), chain_of(other))
     return np.asarray(other.combine @ shifted @ body.links_behind)
 
@@ -101,8 +95,7 @@ def carry_over(body: RigidBody, other: RigidBody) -> Array:
 def masses_beyond(body: RigidBody, link: int) -> Array:
     """Return directions (parameters, k) of base parameters that a longer link moves, beyond others.
 
-    `carry_over` does not tell them: they are by masses of the links behind it that the base
-    parameters of the arm as described do not tell.
+    By masses of the links behind it that the base parameters of the arm as described do not tell.
     """
     _, size, directions = np.linalg.svd(body.combine)
     untold = directions[int(np.sum(size > 1e-9 * size[0])):].T
@@ -118,10 +111,8 @@ def masses_beyond(body: RigidBody, link: int) -> Array:
 
 
 def _shifted(chain: SerialChain, other: SerialChain) -> Array:
-    """Return the parameters of the same bodies in the other's link frames, as a matrix.
-
-    At the same places on their axes; (10 · joints, 10 · joints).
-    """
+    """Return the parameters of the same bodies in the other's link frames, a matrix (10 n, 10
+    n)."""
     n = chain.n_joints
     out = np.zeros((10 * n, 10 * n))
     for i, (one, two) in enumerate(zip(chain.after, other.after, strict=True)):
@@ -144,10 +135,7 @@ def _moved(by: Array) -> Array:
 
 
 def tip_parameters(body: RigidBody) -> Array:
-    """Return what each standard parameter of a body at the tip adds to p: (parameters, 10).
-
-    In axes of the last frame.
-    """
+    """Return what each parameter of a body at the tip, in axes of the last frame, adds to p."""
     return np.asarray(body.combine[:, -10:] @ _moved(chain_of(body).tip))
 
 

@@ -46,10 +46,8 @@ class Acting:
     @classmethod
     def of(cls, effect: Effect, values: Mapping[str, float], std: Mapping[str, float] | None = None,
            origin: Origin = "fitted", revolute: bool = True) -> Acting:
-        """`effect` with `values` of its parameters, units and bounds its own.
-
-        `revolute` tells its joint's kind.
-        """
+        """Return `effect` with `values`, units and bounds its own; `revolute` tells its joint's
+        kind."""
         known, sure = effect.parameters.complete(values), std or {}
         parameters = tuple(Parameter(q.name, known[q.name], sure.get(q.name), q.unit_at(revolute),
                                      (q.low, q.high), origin) for q in effect.parameters)
@@ -110,10 +108,7 @@ class Arm:
 
     @property
     def parameters(self) -> dict[str, Parameter]:
-        """Every number of the model.
-
-        Base parameters by name, the rest by place and name ("viscous:3:coefficient").
-        """
+        """Every number: base parameters by name, the rest as "viscous:3:coefficient"."""
         placed = {f"{acting.place}:{parameter.name}": parameter
                   for acting in (*self.friction, *self.effects) for parameter in acting.parameters}
         return {parameter.name: parameter for parameter in self.base} | placed
@@ -134,10 +129,10 @@ class Arm:
         return replace(self, body=body, base=_base(body, p, "assumed"), uncertainty=None)
 
     def extended(self, *more: Acting) -> Arm:
-        """With more effects, each around those before it.
+        """Return the arm with more effects, each around those before it.
 
-        What misreads an angle around all that act there, what all torque of a joint comes through
-        around that, and what changes the record outermost.
+        What misreads an angle is around loads, drives around that, and what changes the record
+        outermost.
         """
         outer = sorted((*self.effects, *more),
                        key=lambda acting: _ORDER.index(acting.effect.acts_on))
@@ -166,10 +161,7 @@ class Arm:
         return motion.kept(self._key("torque"), nominal).copy()
 
     def friction_torque(self, motion: Motion) -> Array:
-        """Torque (samples, joints) [N m] of the friction laws alone.
-
-        They see the rigid body, not each other. To be read only.
-        """
+        """Torque (samples, joints) [N m] of the friction laws alone. To be read only."""
         return motion.kept(self._key("friction"), lambda: self._friction_torque(motion))
 
     def _key(self, kind: str) -> tuple[object, ...]:
@@ -188,10 +180,7 @@ class Arm:
         return torque
 
     def friction_curves(self, joint: int) -> tuple[SpeedCurve, ...] | None:
-        """Return the friction laws at a joint (1-based) as curves of its speed.
-
-        Returns None where one of them is more than that.
-        """
+        """Return the laws at a joint (1-based) as curves of its speed; None where one is more."""
         curves = [law.effect.speed_curve(law.values) for law in self.friction
                   if law.effect.joint in (joint, None)]
         known = tuple(curve for curve in curves if curve is not None)

@@ -1,9 +1,8 @@
 """The base parameters of any serial arm: the combinations of link parameters that torque can show.
 
-Which standard parameters show only in combination is a property of the arm's geometry. It is found
-numerically, on random states, by a QR factorisation that takes the columns in a fixed order of
-preference and passes over every column that depends on those already taken (Gautier 1991, with the
-pivot chosen by preference, not by size: rounding on another machine then cannot change the set).
+Which show only in combination is found on random states, by a QR factorisation that takes columns
+in a fixed order of preference and passes over those that depend on the ones taken (Gautier 1991,
+the pivot by preference, not by size: rounding then cannot change the set).
 
     Y = [Y_b  Y_b C]    and so    Y φ = Y_b (φ_b + C φ_d) = Y_b p
 """
@@ -59,8 +58,7 @@ class BaseSet:
 def base_set(chain: SerialChain, rng: np.random.Generator) -> BaseSet:
     """Return the base parameter set of `chain`.
 
-    The states fill the whole circle, also beyond the joints' limits: torque is analytic in the
-    state, so what depends within limits depends everywhere, and a wide range shows it best.
+    States fill the whole circle, beyond limits too: torque is analytic in the state.
     """
     n = chain.n_joints
     samples = _SPARE * 10
@@ -82,10 +80,9 @@ def base_set(chain: SerialChain, rng: np.random.Generator) -> BaseSet:
 def _preference(chain: SerialChain) -> list[int]:
     """Return standard parameters, those that a joint shows first, of the last link first.
 
-    Mass that sits on a revolute joint's axis can be moved to the link before it: the mass, the
-    first moment along the axis and one of the moments across it are left for last (Gautier & Khalil
-    1990, who group the same three). Behind a prismatic joint it is all six moments, which the link
-    before it takes over.
+    Mass on a revolute joint's axis can be moved to the link before it: the mass, the first moment
+    along the axis and one of the moments across it come last (Gautier & Khalil 1990). Behind a
+    prismatic joint it is all six moments.
     """
     first: list[int] = []
     last: list[int] = []
@@ -140,10 +137,7 @@ def _combination(leading: int, row: Array) -> str:
 
 
 class BaseArm(RigidBody):
-    """Any serial arm in its base parameters: the general counterpart of the closed form.
-
-    `chain` replaces that of the description, for an arm that is not as described.
-    """
+    """Any serial arm in its base parameters; `chain` replaces that of the description."""
 
     def __init__(self, robot: RobotDescription, chain: SerialChain | None = None) -> None:
         self.robot = robot
@@ -157,10 +151,7 @@ class BaseArm(RigidBody):
 
     @cached_property
     def links_behind(self) -> Array:
-        """(10 · joints, parameters): standard parameters that have the torques of p.
-
-        They are zero outside the base set.
-        """
+        """(10 · joints, parameters): standard parameters with the torques of p, else zero."""
         return np.eye(10 * self.chain.n_joints)[:, list(self.base.chosen)]
 
     def regressor(self, q: Array, dq: Array, ddq: Array) -> Array:

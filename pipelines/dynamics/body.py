@@ -50,8 +50,7 @@ class Motion:
     def kept(self, key: tuple[object, ...], work: Callable[[], Array]) -> Array:
         """Return what `work` makes of this motion: once for the objects of a key, of the last few.
 
-        It is not to be written to. Slopes by differences ask for the same torque once a number. Of
-        a motion whose arrays may be written to nothing is kept.
+        It is not to be written to. Of a motion whose arrays may be written to nothing is kept.
         """
         if any(x.flags.writeable for x in (self.q, self.dq, self.ddq)):
             return work()
@@ -68,10 +67,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class BaseParameter:
-    """One element of the base parameter set.
-
-    Its name, its unit, and the combination of link parameters it stands for.
-    """
+    """One element of the base parameter set."""
 
     name: str  # "p3", or the leading standard parameter of a general arm: "Ixx2"
     unit: str  # "kg m^2"
@@ -90,8 +86,6 @@ class TorqueParts:
 def refuse_other_shapes(columns: int, **states: Array) -> None:
     """Refuse arrays by their names that are not (samples, columns), all with as many samples.
 
-    A 1-D q would else give nonsense.
-
     Raises:
         ValueError: says which array, the shape it has and the shape it must have.
     """
@@ -107,11 +101,7 @@ def refuse_other_shapes(columns: int, **states: Array) -> None:
 
 
 def refuse_other_length(parameters: int, p: Array) -> None:
-    """Refuse p that is not (parameters,).
-
-    Raises:
-        ValueError: says the shape it has and the shape it must have.
-    """
+    """Refuse p that is not (parameters,), with a ValueError."""
     if np.shape(p) != (parameters,):
         raise ValueError(f"p has the shape {np.shape(p)}, wanted is ({parameters},)")
 

@@ -1,12 +1,9 @@
 """Torques of any serial arm, and their regressor in the standard parameters.
 
-Ten standard parameters a link, in this order, in the link's own frame:
-
     m, mx, my, mz, Ixx, Iyy, Izz, Ixy, Ixz, Iyz
 
-mx = ∫x dm is the first moment (mass times centre of mass). Moments and products of inertia are
-about the frame's *origin*, products with *positive* sign, Ixy = +∫xy dm: the inertia tensor's off-
-diagonal elements are their negatives.
+of each link in its own frame: mx = ∫x dm, moments and products of inertia about the frame's
+*origin*, products with *positive* sign, Ixy = +∫xy dm.
 """
 
 from __future__ import annotations
@@ -40,8 +37,8 @@ def regressor(chain: SerialChain, q: Array, dq: Array, ddq: Array,
     """Y with τ = Y φ: (samples, joints, columns), for q, dq, ddq (samples, joints).
 
     `columns` chooses standard parameters by increasing index (10 · link + position in STANDARD);
-    all of them otherwise. The array is stored (joints, columns, samples), samples fastest:
-    `Y.transpose(1, 2, 0)` is contiguous, and so is `out`, memory of that shape to write to.
+    all of them otherwise. The array is stored (joints, columns, samples), samples fastest, and so
+    is `out`, memory of that shape to write to.
     """
     samples = len(q)
     fill = _Filler(chain, columns)
@@ -56,10 +53,7 @@ def regressor(chain: SerialChain, q: Array, dq: Array, ddq: Array,
 
 
 def _parts(first: int, stop: int) -> Iterator[slice]:
-    """first … stop in parts of equal size but for the last.
-
-    A short rest would cost as many calls as a full part.
-    """
+    """Yield first … stop in parts of equal size but for the last."""
     count = -(-(stop - first) // _AT_ONCE)
     size = -(-(stop - first) // max(count, 1))
     return (slice(first + k * size, min(first + (k + 1) * size, stop)) for k in range(count))
@@ -78,12 +72,10 @@ def _by_link(chain: SerialChain, columns: Sequence[int] | None) -> list[list[int
 class _Filler:
     """Writes blocks of the regressor, in memory that is taken once.
 
-    Joint j's torque through link i is its twist on link i's wrench:
-
         τ_j = w_j · n_i + v_j · f_i,    with f_i, n_i linear in the ten parameters of link i
 
-    as in Atkeson, An & Hollerbach 1986, but projected in the link's own frame, where the parameters
-    are constant.
+    Joint j's twist on link i's wrench: Atkeson, An & Hollerbach 1986, projected in the link's own
+    frame, where the parameters are constant.
     """
 
     def __init__(self, chain: SerialChain, columns: Sequence[int] | None) -> None:
@@ -131,11 +123,10 @@ class _Filler:
 
 
 def _project(twists: Array, wrench: Array, own: int | None, out: Array) -> None:
-    """Write to `out` the power of every twist on every wrench.
+    """Write to `out` (joints, columns, samples) the power of every twist on every wrench.
 
-    out (joints, columns, samples), twists (6, joints, samples), wrench (3 or 6, columns, samples).
-    Where the last joint's twist is a unit vector its row of the wrench is the answer; `own` says
-    which row.
+    Twists (6, joints, samples), wrench (3 or 6, columns, samples). Where the last joint's twist is
+    a unit vector, `own` says which row of the wrench is the answer.
     """
     last = out.shape[0] - 1
     # joint by joint: half again as fast as all at once
@@ -198,8 +189,7 @@ def inverse_dynamics(chain: SerialChain, q: Array, dq: Array, ddq: Array, phi: A
                      gravity: Array | None = None) -> Array:
     """τ (samples, joints) [N m] of standard parameters `phi` (joints * 10,).
 
-    The recursive Newton-Euler algorithm, Luh, Walker & Paul 1980. `gravity` replaces the
-    chain's own, so that it can be zero.
+    The recursive Newton-Euler algorithm, Luh, Walker & Paul 1980; `gravity` replaces the chain's.
     """
     g = chain.gravity if gravity is None else gravity
     tau = np.empty(np.shape(q))
@@ -228,12 +218,10 @@ def _wrench(link: LinkMotion, values: Array) -> Array:
 
 
 def _inward(chain: SerialChain, moves: list[Turn], wrenches: list[Array]) -> Array:
-    """Collect the wrenches from the tip inwards.
+    """Collect the wrenches from the tip inwards; each joint's torque (joints, samples) is its
+    share.
 
-    Each joint's torque (joints, samples) is its own axis's share.
-
-    A wrench goes inwards by the transpose of what carries a twist outwards, so that power is the
-    same on both sides.
+    A wrench goes inwards by the transpose of what carries a twist outwards.
     """
     tau = np.empty((chain.n_joints, wrenches[0].shape[1]))
     total = np.zeros_like(wrenches[0])
@@ -246,9 +234,7 @@ def _inward(chain: SerialChain, moves: list[Turn], wrenches: list[Array]) -> Arr
 
 
 def mass_matrix(chain: SerialChain, q: Array, phi: Array) -> Array:
-    """D(q) (samples, joints, joints).
-
-    The sum over links of Uᵀ M U, with U the twists of the joints before it.
+    """D(q) (samples, joints, joints): the sum over links of Uᵀ M U, U the joints' twists.
 
     Siciliano et al. 2009, eq. (7.32), in the link's own frame.
     """

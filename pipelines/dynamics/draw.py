@@ -2,9 +2,8 @@
 
     other = drawn(arm, rng)
 
-The numbers are normal with the covariance of the fit. Of a model file only standard deviations are
-known: then the base parameters are drawn as if independent, and friction is held, because the
-numbers of one law are far from independent.
+By the covariance of the fit; of a model file by the deviations of base parameters, as if
+independent, friction held.
 """
 
 from __future__ import annotations

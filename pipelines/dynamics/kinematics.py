@@ -33,10 +33,7 @@ __all__ = ["Frames", "LinkMotion", "Placement", "SerialChain", "Turn", "cross",
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Where one frame lies in another.
-
-    A point x of the new frame is rotation x + position in the old one.
-    """
+    """Where one frame lies in another: a point x of it is rotation x + position there."""
 
     rotation: Array  # (3, 3)
     position: Array  # (3,) [m]
@@ -52,12 +49,10 @@ class Placement:
 
     @cached_property
     def twist_matrix(self) -> Array:
-        """X (6, 6) with [w'; v'] = X [w; v].
+        """X (6, 6) with [w'; v'] = X [w; v]: a twist about the old origin, about the new one in its
+        axes.
 
-        A twist about the old origin, seen about the new one in the new axes.
-
-        w' = Rᵀ w,  v' = Rᵀ (v + w × p).  Featherstone 2008, ch. 2 (Plücker transform, angular part
-        first).
+        w' = Rᵀ w,  v' = Rᵀ (v + w × p).  Featherstone 2008, ch. 2 (Plücker transform).
         """
         x, y, z = self.position
         lever = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])  # w × p = lever w
@@ -115,10 +110,7 @@ def _distal(joint: Joint) -> tuple[Placement, Placement]:
 
 
 def _modified(joint: Joint) -> tuple[Placement, Placement]:
-    """Rx(alpha) Tx(a) Tz(d) before the joint.
-
-    Tz(d) may stand on either side of a turn about, or shift along, z.
-    """
+    """Rx(alpha) Tx(a) Tz(d) before the joint: Tz(d) commutes with a motion about z."""
     rotation = _about_x(joint.alpha)
     return Placement(rotation, rotation @ np.array([joint.a, 0.0, joint.d])), _NOWHERE
 
@@ -145,10 +137,7 @@ def _urdf(robot: RobotDescription
 
 
 def _z_onto(axis: Array) -> Array:
-    """Return a rotation (3, 3) whose third column is `axis`.
-
-    Exact where the axis is one of ±x, ±y, ±z.
-    """
+    """Return a rotation (3, 3) whose third column is `axis`, exact along ±x, ±y, ±z."""
     if axis[2] == 1.0 and not axis[:2].any():
         return np.eye(3)
     helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
@@ -180,9 +169,7 @@ class Turn:
     def carry(self, twists: Array, scratch: Array | None = None) -> None:
         """Twists (6, count, samples) from before the joint to behind it, in place.
 
-        Rz(q)ᵀ v, or v + w × z s.
-
-        `scratch`, of the same shape, is overwritten; without it new memory is taken.
+        Rz(q)ᵀ v, or v + w × z s. `scratch`, of the same shape, is overwritten.
         """
         if not self.revolute:
             twists[3] += twists[1] * self.shift
@@ -200,10 +187,7 @@ class Turn:
         y -= xs
 
     def carry_wrench_back(self, wrench: Array) -> None:
-        """Return a wrench (6, samples) from behind the joint to before it, in place.
-
-        The transpose of `carry`.
-        """
+        """Carry a wrench (6, samples) from behind the joint to before it, in place."""
         if self.revolute:
             Turn(True, self.cosine, -self.sine, self.shift).carry(wrench[:, None])
         else:  # moment + z s × force
@@ -234,19 +218,13 @@ class LinkMotion:
         return self.spatial_acceleration[:3]
 
     def acceleration(self) -> Array:
-        """Return a (3, samples) [m/s^2] of the frame's origin.
-
-        What an accelerometer there would show.
-        """
+        """Return a (3, samples) [m/s^2] of the frame's origin, as an accelerometer shows it."""
         return self.spatial_acceleration[3:] + cross(self.omega, self.velocity[3:])
 
 
 @dataclass(frozen=True, eq=False)
 class WalkingMemory:
-    """The working memory of `link_motions`.
-
-    Taking it anew for every block would cost more than the arithmetic.
-    """
+    """The working memory of `link_motions`: taken anew it would cost more than the arithmetic."""
 
     state: Array  # (6, columns, samples)
     other: Array
@@ -287,9 +265,8 @@ def link_motions(chain: SerialChain, moves: list[Turn], dq: Array, ddq: Array, g
 
         V_i = X V + s q̇,   A_i = X A + s q̈ + V_i × s q̇        Featherstone 2008, ch. 5
 
-    with X the change of frame and s the joint's twist. Acceleration, velocity and the twists of all
-    joints so far are the columns of one array, so that every change of frame is one small matrix on
-    many samples.
+    with X the change of frame and s the joint's twist. Acceleration, velocity and all twists so far
+    are the columns of one array: every change of frame is one small matrix on many samples.
     """
     state, other = memory.state, memory.other
     state[:, :2] = 0.0
@@ -308,10 +285,7 @@ def link_motions(chain: SerialChain, moves: list[Turn], dq: Array, ddq: Array, g
 
 
 def _through(place: Placement, state: Array, other: Array, used: int) -> tuple[Array, Array]:
-    """Carry the first `used` columns through a fixed placement.
-
-    Returns where they are now, and the memory that is free.
-    """
+    """Carry `used` columns through a fixed placement; return where they are, and free memory."""
     if not place.moves:
         return state, other
     samples = state.shape[2]
@@ -321,10 +295,7 @@ def _through(place: Placement, state: Array, other: Array, used: int) -> tuple[A
 
 
 def _drive(acceleration: Array, velocity: Array, revolute: bool, dq: Array, ddq: Array) -> None:
-    """Add the joint's own speed and acceleration to A and V (6, samples), in place.
-
-    These are s q̇, s q̈ and V × s q̇.
-    """
+    """Add the joint's own s q̇ to V and s q̈, V × s q̇ to A (6, samples), in place."""
     axis, first = (2, 0) if revolute else (5, 3)
     acceleration[first] += velocity[1] * dq  # ω × z q̇
     acceleration[first + 1] -= velocity[0] * dq
@@ -372,9 +343,7 @@ def tip_position(chain: SerialChain, q: Array) -> Array:
 
 
 def jacobian(chain: SerialChain, q: Array) -> Array:
-    """Geometric Jacobian (samples, 6, joints) of the tip in base axes.
-
-    Rows 0-2 velocity [m], 3-5 angular velocity.
+    """Geometric Jacobian (samples, 6, joints) of the tip in base axes: velocity, angular velocity.
 
     Revolute: [z × (tip - anchor); z]; prismatic: [z; 0]. Siciliano et al. 2009, eq. (3.30).
     """

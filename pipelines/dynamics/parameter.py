@@ -36,10 +36,7 @@ class Parameter:
 
     @property
     def words(self) -> str:
-        """Value, uncertainty and unit with the digits that the uncertainty leaves.
-
-        "1.930 ± 0.021 kg".
-        """
+        """Value, uncertainty and unit, of as many digits as that leaves: "1.930 ± 0.021 kg"."""
         unit = "" if self.unit == "1" else f" {self.unit}"
         if self.std is None or not math.isfinite(self.std) or self.std <= 0:
             return f"{self.value:.6g}{unit}"
@@ -49,10 +46,7 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """How the errors of several numbers go together.
-
-    What one has too much, another has too little.
-    """
+    """How the errors of several numbers go together."""
 
     names: tuple[str, ...]
     covariance: npt.NDArray[np.float64]  # (k, k); not finite where a number is not determined

@@ -43,10 +43,7 @@ class Named:
 
 
 def named_in(name: str) -> Named | None:
-    """Return the effect and the parameter that `name` is of, which `log.result_figures` gave.
-
-    Returns None where it is of no effect.
-    """
+    """Return the effect and the parameter that `name` is of; None where it is of no effect."""
     for start in (word.start() for word in _WORD.finditer(name)):
         for pattern in _CAUSES:
             if (found := pattern.fullmatch(name, start)) is not None and found[1] in effect_names():
@@ -58,10 +55,8 @@ def named_in(name: str) -> Named | None:
 
 
 def quantity_of(name: str) -> Quantity | None:
-    """Return the quantity that a figure of this name is a value of.
-
-    Returns None where it is of no effect, as a base parameter is.
-    """
+    """Return the quantity that a figure of this name is a value of; None where it is of no
+    effect."""
     found = named_in(name)
     if found is None:
         return None
@@ -79,10 +74,7 @@ def numbered(parameter: str) -> tuple[str, int]:
 
 
 def part_of(cause: str, parameter: str) -> tuple[str, int]:
-    """Return the effect's own parameter, and of the how manieth one at its joint it is.
-
-    Its numbers are counted on (`once_each`).
-    """
+    """Return the effect's own parameter, and of the how manieth one at its joint it is."""
     known = [q.name for q in find_effect(cause).parameters] if cause in effect_names() else []
     name, number = numbered(parameter)
     numbers = max((numbered(own)[1] for own in known), default=1)

@@ -74,10 +74,8 @@ def torque_slopes(torque: Torque, motion: Motion, index: int) -> Array:
 
 
 def arm_slopes(arm: Moving, motion: Motion, index: int) -> Array:
-    """Return K_j, C_j, M_j (3, samples, joints) of an arm with its friction.
-
-    Kept with the motion.
-    """
+    """Return K_j, C_j, M_j (3, samples, joints) of an arm with its friction, kept with the
+    motion."""
     return motion.kept(("slopes of the arm", arm, index),
                        lambda: torque_slopes(arm.torque, motion, index))
 

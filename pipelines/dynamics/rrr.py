@@ -1,10 +1,7 @@
 """The dynamics of the RRR arm in closed form, linear in 15 base parameters.
 
-Kostić et al. 2004, eq. (8), (A4) and (A5), with the one wrong entry of the print corrected (erratum
-E1: the last trigonometric function of r34 is a cosine, as in r24). Conventions: `verified.md`,
-section 0.
-
-The letters: S = q2 + q3; c, s a cosine and sine; g the gravitational acceleration.
+Kostić et al. 2004, eq. (8), (A4) and (A5), with erratum E1: the last trigonometric function of r34
+is a cosine. Conventions: `verified.md`, section 0. S = q2 + q3; c, s a cosine and sine.
 """
 
 from __future__ import annotations
@@ -58,10 +55,8 @@ _COMBINATIONS = (
 
 
 def fits(robot: RobotDescription) -> bool:
-    """Return whether (A1)-(A5) describe `robot`.
-
-    DH with alpha = (pi/2, 0, 0), a1 = 0, gravity along -z, no tool.
-    """
+    """Return whether (A1)-(A5) hold: DH, alpha = (pi/2, 0, 0), a1 = 0, gravity along -z, no
+    tool."""
     if robot.convention != "dh" or robot.revolute != (True, True, True):
         return False
     one, two, three = robot.joints
@@ -94,10 +89,7 @@ class RRR(RigidBody):
 
     @cached_property
     def links_behind(self) -> Array:
-        """(30, 15): standard parameters that have the torques of p.
-
-        They are zero outside the base set of the general arm.
-        """
+        """(30, 15): standard parameters with the torques of p, else zero."""
         base = BaseArm(self.robot).base
         links = np.zeros((30, 15))
         links[list(base.chosen)] = np.linalg.inv(self.combine[:, list(base.chosen)])
@@ -126,12 +118,10 @@ class RRR(RigidBody):
 
     def acting_rows(self, q: Array, dq: Array, ddq: Array,
                     out: Array) -> tuple[Array, Array, Array]:
-        """Return what is not always zero in R, of each joint (columns, samples).
-
-        `ACTING` tells which columns.
+        """Return what is not always zero in R, of each joint (columns, samples), as `ACTING` tells.
 
         Written to `out` (28, samples), in which the columns that rows two and three share stand
-        once: a fit then reads no zero and copies nothing. For q, dq, ddq (samples, 3).
+        once. For q, dq, ddq (samples, 3).
         """
         angles, v, u = (np.ascontiguousarray(np.transpose(x), dtype=np.float64)
                         for x in (q, dq, ddq))
@@ -198,10 +188,7 @@ class RRR(RigidBody):
         return np.asarray(self.regressor(q, dq, ddq) @ p)
 
     def _trigonometry(self, q2: Array, q3: Array) -> tuple[Array, ...]:
-        """cos and sin of q2, q3 and S.
-
-        Those of S follow by the addition theorem, which costs a third of two more calls.
-        """
+        """cos and sin of q2, q3 and S; those of S by the addition theorem."""
         q2, q3 = q2 + self._offset[1], q3 + self._offset[2]
         c2, s2, c3, s3 = np.cos(q2), np.sin(q2), np.cos(q3), np.sin(q3)
         return c2, s2, c3, s3, c2 * c3 - s2 * s3, s2 * c3 + c2 * s3

@@ -1,11 +1,9 @@
 """Forward and inverse kinematics of the RRR arm in closed form.
 
-Kostić et al. 2004, eq. (A1)-(A3). (A3) is printed with asin and atan and with a garbled root; what
-stands here is its corrected form with atan2, all four branches, and what to say where there is none
-(errata E2-E5 of `verified.md`).
+    answer = inverse(rrr_geometry(robot), tips)         every branch of every tip, with its status
 
-    geometry = rrr_geometry(robot)
-    answer = inverse(geometry, tips)         every branch of every tip, with its status
+Kostić et al. 2004, eq. (A1)-(A3), corrected by errata E2-E5 of `verified.md`: atan2, all four
+branches, and what to say where there is none.
 """
 
 from __future__ import annotations

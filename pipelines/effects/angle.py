@@ -29,12 +29,10 @@ _TERMS = ("stiffness", "curvature", "hardening", "fourth", "fifth", "sixth", "se
 
 @dataclass(frozen=True)
 class _Waves(Pointwise):
-    """Σ A_m sin(m k q + φ_m), m = 1, 2, 3.
+    """Σ A_m sin(m k q + φ_m), m = 1, 2, 3, of columns sin mkq, cos mkq.
 
-    The columns are sin mkq, cos mkq; their amplitudes A_m cos φ_m and A_m sin φ_m. A search looks
-    for m = 1 alone. Magnets, slots and teeth that turn with the joint are so many a turn: k is
-    whole. What turns behind a gear has a k of its own; on a prismatic joint it counts waves in 2π
-    metres.
+    A search looks for m = 1 alone. What turns with the joint has a whole k, what turns behind a
+    gear a k of its own; on a prismatic joint it counts waves in 2π metres.
     """
 
     order: float = 1.0  # k [1/rev of the joint]
@@ -102,8 +100,8 @@ class Cogging(_Waves):
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """Return the orders that the travel resolves.
 
-        Where the joint closes its circle, or nearly, whole orders are held: as long as waves of
-        other orders are missing from the model, they would pull a free one off its place.
+        Where the joint closes its circle, or nearly, whole orders are held: waves that the model
+        still lacks would pull a free one off its place.
         """
         travel, turning = float(np.ptp(self.own(motion.q))), arm.robot.revolute[self.index]
         around = turning and self.goes_round(motion, ORDERS.nearly)
@@ -130,8 +128,7 @@ class Cogging(_Waves):
 def _orders_along(travel: float, revolute: bool) -> list[float]:
     """Return orders from the fewest waves in `travel` [rad or m], in half steps of what it tells.
 
-    Over many turns whole ones. Where the joint closes its circle, or nearly, whole orders are among
-    them, on a closed one from one on, for what comes back to where it began is no spring.
+    Over many turns, and where the joint nearly closes its circle, whole ones are among them.
     """
     travel, turn = max(travel, ORDERS.least), 2.0 * math.pi
     fewest = ORDERS.waves * turn / travel
@@ -149,10 +146,9 @@ def _orders_along(travel: float, revolute: bool) -> list[float]:
 
 @dataclass(frozen=True)
 class PositionFriction(_Waves):
-    """τ = Σ A_m sin(m k q + φ_m) c(v), m = 1, 2, 3.
+    """τ = Σ A_m sin(m k q + φ_m) c(v), m = 1, 2, 3: Coulomb friction along the turn.
 
-    Coulomb friction that varies along the turn, c(v) its sign as in `Coulomb`. Where it rubs in
-    bands a wave is no sine, and its harmonics carry over to where one alone would not.
+    c(v) is its sign as in `Coulomb`.
     """
 
     sharpness: float = 100.0  # w [s/rad]
@@ -170,12 +166,9 @@ class PositionFriction(_Waves):
         return [sign * part for part in super().parts(q, v, m)]
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """Whole orders; also halves where the joint moves over more than a turn.
+        """Whole orders, halves beyond a turn; on a slide half waves of its travel.
 
-        A slide has as many half waves in its travel.
-
-        A refit takes no more harmonics than half waves were travelled, unless held-out motion asks
-        for them: more may be any curve there, and another one beyond.
+        A refit takes no more harmonics than half waves were travelled, unless held-out motion asks.
         """
         travel, highest = float(np.ptp(self.own(motion.q))) or 1.0, EFFECTS.highest_order
         if arm.robot.revolute[self.index]:
@@ -189,10 +182,7 @@ class PositionFriction(_Waves):
             yield replace(self, order=order, harmonics=1, most=most, whole=whole)
 
     def forms(self) -> tuple[Self, ...]:
-        """Return it with more harmonics than half waves were travelled, and behind a gear.
-
-        Held-out motion decides how many harmonics it has.
-        """
+        """Return it with more harmonics, and behind a gear; held-out motion decides."""
         forms = [replace(self, harmonics=m, most=m) for m in range(self.most, len(_TAILS) + 1)]
         return (*forms, replace(forms[0], whole=False)) if self.whole else tuple(forms)
 
@@ -201,14 +191,9 @@ class PositionFriction(_Waves):
 class Spring(Pointwise):
     """τ = k x + b x² + c x³ + d x⁴ + e x⁵ (+ f x⁶ + g x⁷), x = q - q0.
 
-    A polynomial in q, whose coefficients are the amplitudes.
-
-    A search looks for k x alone. Of several zeros of the polynomial the one nearest to that of its
-    linear part is q0. Where gravity acts on the joint, the fit of its weight takes much of the
-    polynomial: k, of either sign then, and q0 are known poorly. With odd powers alone they were no
-    better known, and the fit, no longer linear, ended elsewhere.
-
-    Beyond the angles that it was fitted to, where a polynomial tells nothing, it goes straight on.
+    A search looks for k x alone. Of several zeros the one nearest to that of the linear part is q0.
+    Beside gravity k and q0 are known poorly. Beyond the angles it was fitted to it goes straight
+    on.
     """
 
     seen_from: float = -_FAR
@@ -228,10 +213,7 @@ class Spring(Pointwise):
         return parts
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """Straight alone where a joint without limits closes its circle.
-
-        What comes back to where it began there is a wave.
-        """
+        """Straight alone where a joint without limits closes its circle: else it is a wave."""
         low, high = arm.robot.joints[self.index].position
         endless = math.isinf(high - low) and arm.robot.revolute[self.index]
         highest = 1 if endless and self.goes_round(motion) else self.highest
@@ -241,10 +223,7 @@ class Spring(Pointwise):
         )
 
     def forms(self) -> tuple[Self, ...]:
-        """Return laws of fewer terms, where these are enough.
-
-        Beside gravity many powers of an angle are no powers of their own.
-        """
+        """Return laws of fewer terms: beside gravity many powers are none of their own."""
         degrees = (_DEGREE, 1, 3, _MORE) if self.highest > 1 else (1,)
         return tuple(replace(self, degree=d) for d in degrees)
 

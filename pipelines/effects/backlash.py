@@ -40,10 +40,8 @@ class Backlash(Effect):
 
         (D - J_m) ẍ = -(τ_j - J_m q̈_j) - c ẋ - flank,    flank = k (|x| - gap/2) sign x + d ẋ
 
-    The flank never pulls. Torque, friction and encoder sit on the motor's side. x follows from the
-    measured motion and the rigid torque, and with it τ = τ_rigid(q + x) - τ_rigid(q), J_m ẍ less on
-    its own row. Where the gap is crossed in no time, x = -gap/2 sign(τ_j). The flank is 80 Hz stiff
-    and critically damped: what rings on a stiffer one depends on the tooth and not on the gap.
+    The flank, 80 Hz stiff and critically damped, never pulls. Torque, friction and encoder sit on
+    the motor's side: τ = τ_rigid(q + x) - τ_rigid(q), J_m ẍ less on its own row.
     """
 
     gap: float = 1e-3  # [rad]
@@ -94,11 +92,8 @@ class Backlash(Effect):
         return found
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """Gaps a good third apart, for too small a gap explains nothing.
-
-        Lubricants a factor of three apart, for where one far too thin is looked for, the gap's
-        torque comes and goes by chance; a motor of a tenth of what the joint feels.
-        """
+        """Gaps a good third apart, lubricants a factor of three, a motor of a tenth of the
+        joint."""
         motor = 0.1 * float(np.mean(_felt(arm, motion.q, self.index)))
         tau = self.own(rigid_torque(arm.body, arm.p, motion))
         usual = float(np.median(np.abs(tau))) or 1.0

@@ -8,18 +8,16 @@ torque is more than columns times amplitudes, one of these says how, exactly:
     altered(arm, values)                   gravity, geometry, load: the arm as it truly is
     passed(tau, motion, arm, values)       a drive or a recorder: what the log shows of all torque
 
-An object is the effect in one place and one shape: `joint` and the *non-linear* parameters (speeds,
-orders, delays) are its fields. The *linear* parameters, its amplitudes, are not: a fit solves for
-them.
+An object is the effect in one place and one shape: `joint` and the *non-linear* parameters are its
+fields; a fit solves for the *linear* ones, its amplitudes.
 
     torque = columns(motion, arm) @ amplitudes      to first order; exactly for most
 
-Torque is a load: measured torque = torque of the model + torques of the effects. Columns are
-computed from the motion and the *predicted* torque, never from measured torque, whose noise would
-bias them. One exception: the torque that a drive keeps back above its limit follows from the
-commanded torque alone, which is `Motion.tau`. Columns need not be independent, nor all visible, on
-every arm: solve with a rank threshold. Each motion is one log from its first sample (time in a log
-counts from motion.t[0]).
+Torque is a load: measured torque = torque of the model + torques of the effects. Columns follow
+from motion and *predicted* torque, never from measured torque, whose noise would bias them; but
+what a drive keeps back above its limit follows from the commanded torque, `Motion.tau`. Columns
+need not be independent, nor all visible: solve with a rank threshold. Each motion is one log from
+its first sample.
 """
 
 from __future__ import annotations
@@ -143,7 +141,7 @@ class Effect(ABC):
     ) -> Array:
         """Return the torque (samples, joints) that a log shows with this effect, exactly.
 
-        `predict` says what it would show without; effects are thus put one around the other.
+        `predict` says what it would show without: effects are put one around the other.
         """
         true, other = self.corrected(motion, values), self.altered(arm, values)
         tau = predict(true, other) if predict is not None else other.torque(true)
@@ -241,10 +239,7 @@ class Effect(ABC):
         return float(np.abs(self.own(motion.dq)).max(initial=0.0)) or 1.0
 
     def goes_round(self, motion: Motion, but: float = 0.02) -> bool:
-        """Return whether its own joint travels all of a circle but for a fiftieth, or for `but`.
-
-        What it does there comes back to where it began.
-        """
+        """Return whether its own joint travels all of a circle but for a fiftieth, or for `but`."""
         return float(np.ptp(self.own(motion.q))) > (1.0 - but) * 2.0 * np.pi
 
     def goes_beyond(self, motions: Sequence[Motion], known: Sequence[Motion]) -> bool:
@@ -261,10 +256,7 @@ class Effect(ABC):
         return self.own(self.torque(motion, arm, values))
 
     def on_own_row(self, arm: ArmModel, *columns: Array) -> Array:
-        """`columns`, each (samples,), as (samples, joints, columns) of its own joint only.
-
-        Samples lie side by side.
-        """
+        """`columns`, each (samples,), as (samples, joints, columns) of its own joint only."""
         rows = np.zeros((arm.n_joints, len(columns), len(columns[0])))
         for k, column in enumerate(columns):
             rows[self.index, k] = column

@@ -44,11 +44,10 @@ class _Altering(Effect):
 
 @dataclass(frozen=True)
 class GravityTilt(_Altering):
-    """g = |g| (cos θ down + sin θ (cos δ e_x + sin δ e_y)).
+    """g = |g| (cos θ down + sin θ (cos δ e_x + sin δ e_y)), e_x and e_y across nominal gravity.
 
-    With e_x and e_y the base axes across nominal gravity. A joint 1 that stands upright then feels
-    the weight of what it carries. Where its centre of mass lies no level arm tells: two more
-    amplitudes, S sin q1 + C cos q1 on joint 1.
+    A joint 1 that stands upright then feels the weight of what it carries: where its centre of mass
+    lies no level arm tells, so that S sin q1 + C cos q1 on it are two more amplitudes.
     """
 
     name = "gravity_tilt"
@@ -109,10 +108,7 @@ def _waist(motion: Motion, values: Values) -> Array:
 
 
 def _axes(arm: ArmModel) -> tuple[float, Array, Array, Array]:
-    """Return |g|, down, and e_x, e_y.
-
-    The base's x and y (z, where one of them lies along gravity) without their part along it.
-    """
+    """Return |g|, down, and two base axes without their part along it, e_x and e_y."""
     gravity = chain_of(arm.body).gravity
     size = float(np.linalg.norm(gravity))
     basis = [gravity / size] if size else [np.array([0.0, 0.0, -1.0])]
@@ -125,10 +121,7 @@ def _axes(arm: ArmModel) -> tuple[float, Array, Array, Array]:
 
 
 def _upright(arm: ArmModel) -> bool:
-    """Return whether joint 1 does not feel gravity on a level base.
-
-    Elsewhere a fit of the arm tells S and C.
-    """
+    """Return whether joint 1 does not feel gravity on a level base."""
     chain = chain_of(arm.body)
     leaning = float(np.linalg.norm(np.cross(chain.before[0].rotation[:, 2], _axes(arm)[1])))
     return chain.revolute[0] and leaning <= _UPRIGHT
@@ -136,10 +129,9 @@ def _upright(arm: ArmModel) -> bool:
 
 @dataclass(frozen=True)
 class LinkLength(_Altering):
-    """τ = Y(a + e) p'.
+    """τ = Y(a + e) p': all beyond link k sits e further along it, along x of its frame.
 
-    All beyond link k sits e further along it, along x of its frame, in a URDF towards the next
-    joint. p' are the base parameters of the same links in the new geometry.
+    In a URDF towards the next joint. p' are the base parameters of the same links there.
     """
 
     link: float = 1.0  # k, 1-based: from joint k to joint k + 1
@@ -154,10 +146,7 @@ class LinkLength(_Altering):
         return np.asarray(longer - shorter)[..., None] / (2.0 * _STEP)
 
     def nuisance(self, arm: ArmModel) -> Array:
-        """Masses beyond the link turn on a longer lever.
-
-        How heavy each of them is base parameters do not say.
-        """
+        """Masses beyond the link turn on a longer lever; base parameters do not tell them."""
         return masses_beyond(arm.body, int(self.link))
 
     def altered(self, arm: ArmModel, values: Values) -> ArmModel:
@@ -170,12 +159,9 @@ class LinkLength(_Altering):
 
 @dataclass(frozen=True)
 class Payload(_Altering):
-    """p + B φ.
+    """p + B φ: the base parameters with one more body at the tip, φ = (m, m c, I) about the tip.
 
-    The base parameters of the arm with one more body at its tip, whose ten parameters are φ.
-
-    φ = (m, m c, I), about the tip in axes of the last frame, products with positive sign. A search
-    takes I = 0, so that the second moments are those of a body no larger than a point.
+    In axes of the last frame, products with positive sign. A search takes I = 0.
     """
 
     extended: bool = True  # with its six moments of inertia
@@ -216,11 +202,8 @@ class Payload(_Altering):
 
 @dataclass(frozen=True)
 class RotorInertia(Effect):
-    """τ = I ddq, on its own joint only: a rotor turns with its joint, whatever the arm's posture.
-
-    At joint side: gear ratio squared times the rotor's own inertia. Its gyroscopic torques are
-    small beside it.
-    """
+    """τ = I ddq, on its own joint only, at joint side: a rotor turns with its joint in any
+    posture."""
 
     name = "rotor_inertia"
     from_motion = True
@@ -235,11 +218,10 @@ class RotorInertia(Effect):
 
 @dataclass(frozen=True)
 class TransmissionCoupling(Effect):
-    """τ_s = J ds/dt + B s + C tanh(w s), s = v_j + ρ v_i.
+    """τ_s = J ds/dt + B s + C tanh(w s), s = v_j + ρ v_i: τ_s on joint j, ρ τ_s on joint i.
 
-    It is a load of τ_s on joint j and of ρ τ_s on joint i. ρ is what the robot's transmission
-    matrix N says of the motor that both share: N_ki/N_kj, k one of the two; 1 without one. Of the
-    two joints j is the later, for s does not tell them apart.
+    ρ = N_ki/N_kj by the robot's transmission matrix N, k one of the two; 1 without one. Of the two
+    joints j is the later, for s does not tell them apart.
     """
 
     with_joint: float = 0.0  # i, 1-based; the joint before, if none is given
@@ -255,10 +237,7 @@ class TransmissionCoupling(Effect):
         return table
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """Return the joints that share a motor by the transmission matrix.
-
-        Where there is none, it is the joint before.
-        """
+        """Return the joints that share a motor by the transmission matrix, or the one before."""
         matrix = arm.robot.drive.transmission if arm.robot.drive is not None else None
         own, earlier = self.index, range(self.index)
         shared = [i for i in earlier if matrix is not None and (matrix[own][i] or matrix[i][own])]

@@ -21,13 +21,9 @@ __all__ = ["Contact"]
 
 @dataclass(frozen=True)
 class Contact(Event):
-    """τ = -Jᵀ F sin(π (t - t0)/D) while 0 < t - t0 < D.
+    """τ = -Jᵀ F sin(π (t - t0)/D) while 0 < t - t0 < D: a push F on the tip, in the base frame.
 
-    A push F on the tip, in the base frame, that grows and fades.
-
-    t is the time since the start of the log: what comes again wherever the same motion is repeated
-    comes at the same t, whatever the clocks say. It belongs to one log: what a fit of the arm
-    should do is to leave out its samples.
+    t counts from the start of its log, to which it belongs: a fit should leave out its samples.
     """
 
     start: float = 0.0  # t0 [s]

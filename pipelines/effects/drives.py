@@ -43,10 +43,7 @@ class _InDrive(Effect):
 
 @dataclass(frozen=True)
 class TorqueGain(_InDrive):
-    """Applied torque = (1 + ε) logged torque, so that the log shows τ/(1 + ε).
-
-    The column is τ, the model's torque, its amplitude c = 1/(1 + ε) - 1.
-    """
+    """Applied torque = (1 + ε) logged torque: the log shows τ/(1 + ε), c = 1/(1 + ε) - 1."""
 
     name = "torque_gain"
     acts_on = "drive"
@@ -70,10 +67,7 @@ class TorqueGain(_InDrive):
 
 @dataclass(frozen=True)
 class TorqueCrosstalk(_InDrive):
-    """Applied torque of joint j = u_j - c u_i, so that the log shows u_j = τ_j + c τ_i.
-
-    Joint i is the joint before, if none is given.
-    """
+    """Applied torque of joint j = u_j - c u_i: the log shows u_j = τ_j + c τ_i."""
 
     from_joint: float = 0.0  # i, 1-based
 
@@ -96,12 +90,9 @@ class TorqueCrosstalk(_InDrive):
 class TorqueSaturation(_InDrive):
     """Applied torque = u - e, e = sign(u) max(|u| - L, 0), u the logged torque.
 
-    The log shows e more than the arm feels.
-
-    The arm's motion tells the torque that came out, never what was asked for above L: u is
-    `Motion.tau`, or where there is none the predicted torque. Held over each sample, e_k is the
-    average of e over it; the column is e itself at t_k: (7 (e_k + e_{k-1}) - e_{k+1} - e_{k-2})/12,
-    Colella & Woodward 1984, eq. (1.9) with even steps.
+    Motion tells the torque that came out: u is `Motion.tau`, or else the predicted torque. Held
+    over each sample, e_k is the average of e over it; the column is e at t_k: (7 (e_k + e_{k-1}) -
+    e_{k+1} - e_{k-2})/12, Colella & Woodward 1984, eq. (1.9) with even steps.
     """
 
     limit: float = 10.0  # L [N m]
@@ -146,16 +137,10 @@ class TorqueSaturation(_InDrive):
 
 @dataclass(frozen=True)
 class LoadFriction(_InDrive, FrictionLaw):
-    """τ = µ |τ_l| tanh(w v), τ_l what the joint transmits: its torque without friction.
+    """τ = µ |τ_l| tanh(w v)/(1 - i µ c), c = sign(τ_l) tanh(w v), τ_l what the joint transmits.
 
-    Coulomb friction is Fc + µ |τ_l| then.
-
-    What rubs behind a gear is part of its load: τ_l has the share s of the joint's other friction
-    too. Lifting a weight then rubs more than lowering it, which is no friction that differs by
-    direction. And a gear may lose a part of what goes in, not of what comes out: the share i of the
-    loss is part of the load as well,
-
-        τ = µ |τ_l| tanh(w v) / (1 - i µ c),   c = sign(τ_l) tanh(w v).
+    τ_l is its torque without friction, but for the share s of it that rubs behind the gear; and a
+    gear that loses a part of what goes in has the share i of the loss in its load.
     """
 
     sharpness: float = 100.0  # w [s/rad]
@@ -183,7 +168,7 @@ class LoadFriction(_InDrive, FrictionLaw):
         return _lost(load, np.tanh(values["sharpness"] * dq), values)
 
     def asked(self, tau: Array, motion: Motion, arm: ArmModel, values: Values) -> Array:
-        """Return the torque; the load is that of all inside it but for friction before it."""
+        """Count as load all inside it but for friction before it."""
         own, side = self.own(tau), np.tanh(values["sharpness"] * self.own(motion.dq))
         load = own - (1.0 - values.get("behind", 0.0)) * self.own(arm.friction_torque(motion))
         return np.asarray(own + _lost(load, side, values))
@@ -192,8 +177,6 @@ class LoadFriction(_InDrive, FrictionLaw):
         """Return the load of the drive's torque τ: τ is friction before it f, τ_l and its friction.
 
             τ_l = (τ - f)(1 - i µ c)/(1 + (1 - i) µ c),   c = sign(τ - f) tanh(w v)
-
-        Solved for the load, because the load holds the acceleration that is being computed.
         """
         index, curves = self.index, arm.friction_curves(self.index + 1)
         known = self.parameters.complete(values)
@@ -243,10 +226,10 @@ class _Lag(_InDrive):
 
 @dataclass(frozen=True)
 class DriveLag(_Lag):
-    """T dτ/dt = u - τ, so that the log, which holds the command, shows u = τ + T dτ/dt.
+    """T dτ/dt = u - τ: the log, which holds the command, shows u = τ + T dτ/dt.
 
-    The log shows it earlier than the arm feels it. A filter that is computed once a sample h acts
-    at once, half a sample earlier: τ_k = a τ_{k-1} + (1 - a) u_k, a = exp(-h/T).
+    A filter that is computed once a sample h acts half a sample earlier: τ_k = a τ_{k-1} + (1 - a)
+    u_k, a = exp(-h/T).
     """
 
     name = "drive_lag"
@@ -266,8 +249,7 @@ class DriveLag(_Lag):
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """Exact while a command is held: τ = u + (τ_k - u) e^(-(t - t_k)/T).
 
-        The memory is τ_k, t_k and u; the drive has settled at the first command; before that there
-        is none. The torque of a digital filter is constant over a sample.
+        The memory is τ_k, t_k and u; the drive has settled at the first command.
         """
         time, digital = max(values["time_constant"], 1e-9), values.get("sample_time", 0.0) > 0.0
 
@@ -297,8 +279,6 @@ class DriveLag(_Lag):
 class TorqueLag(_Lag):
     """T dy/dt = τ - y, y the logged torque: y = τ - T dτ/dt to first order.
 
-    The arm feels τ at once.
-
     A filter that is computed once a sample h acts half a sample earlier: y_k = a y_{k-1} + (1 - a)
     τ_k, a = exp(-h/T).
     """
@@ -317,7 +297,7 @@ class TorqueLag(_Lag):
         return self.on_own_row(arm, -rate_of_change(tau, motion.t))
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """Return the limit, and lags in which a torque turns: it is no longer its Taylor series."""
+        """Return the limit, and lags in which a torque turns."""
         for time in EFFECTS.lags:
             yield replace(self, looked_for=time, step=motion.sample_time)
 
@@ -332,8 +312,8 @@ class TorqueLag(_Lag):
     def asked(self, tau: Array, motion: Motion, arm: ArmModel, values: Values) -> Array:
         """Return y = H τ = τ - T H dτ/dt: all torque goes through the low-pass H.
 
-        The first form where the lag is longer than some samples, whatever the torque does between
-        them; the second keeps its slope at T = 0 and is exact to the differences' error.
+        The first form where the lag is longer than some samples; the second keeps its slope at T =
+        0.
         """
         own, t = self.own(tau), motion.t
         time, sooner = continuous(values["time_constant"], values.get("sample_time", 0.0))

@@ -55,13 +55,7 @@ class _Misreading(Effect):
 
 @dataclass(frozen=True)
 class EncoderCrosstalk(_Misreading):
-    """q_measured,j = q_j + c q_i.
-
-    Joint j, where this effect sits, is read with a part of joint i, which is read well.
-
-    To first order τ = c P_j(-q_i). Exactly: c q_i taken off q_j, and so with speed and
-    acceleration.
-    """
+    """q_measured,j = q_j + c q_i: to first order τ = c P_j(-q_i), joint i being read well."""
 
     from_joint: float = 0.0  # i, 1-based
 
@@ -126,12 +120,10 @@ class EncoderEccentricity(_Misreading):
 
 @dataclass(frozen=True)
 class TimeDelay(_Misreading):
-    """q_measured(t) = q(t - Δ) at one joint.
+    """q_measured(t) = q(t - Δ) at one joint: the arm is where it will be measured to be.
 
-    The arm is where it will be measured to be, q(t) = q_measured(t + Δ).
-
-    To first order τ = Δ P_j(q̇_j). Exactly: q_j, its speed and its acceleration, each moved by Δ
-    along its cubic spline.
+    To first order τ = Δ P_j(q̇_j). Exactly: q_j, its speed and its acceleration along their
+    splines.
     """
 
     name = "time_delay"
@@ -161,8 +153,7 @@ class TimeDelay(_Misreading):
         """Return the hooks of an encoder that reads from a record of past positions and speeds.
 
         States: time since the start and q now, then time, q, q̇ of each kept sample, the newest
-        first. Between the newest and now, whose speed an encoder does not know, a parabola. What
-        other sensors add stays.
+        first. Between the newest and now, whose speed an encoder does not know, a parabola.
         """
         j, delay = self.index, values["delay"]
         if not delay:

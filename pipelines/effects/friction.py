@@ -81,23 +81,14 @@ class Viscous(_Curved, FrictionLaw):
 
 @dataclass(frozen=True)
 class Coulomb(_Curved, FrictionLaw):
-    """τ = Fc ((2 - r) tanh(x) + (r - 1) x/√(1 + x²)), x = w v.
+    """τ = Fc ((2 - r) tanh(x) + (r - 1) x/√(1 + x²)), x = w v, of roundness r up to 2.
 
     From r = 2 on it is Fc ((3 - r) x/√(1 + x²) + (r - 2) (2/π) arctan x).
 
-    tanh(w v) stands for sign(v) in fits and in simulation alike. In a fit, a reconstructed speed
-    passes zero a little early or late, and a jump there leaves spikes that look like presliding. In
-    a simulation, sign(v) chatters at every step, where tanh is stable as long as the step h keeps w
-    Fc h / J below 2. One law in both means that what the fit explains, the simulation shows. The
-    width 1/w is itself fitted, over the grid of `shapes`; by default it is 0.01 rad/s, far below
-    the speeds at which Coulomb and viscous friction are told apart.
-
-    By which curve the friction of a real joint changes its sign nobody knows: tanh (r = 1), v/√(v²
-    + ε²) (r = 2), the arc tangent (r = 3) and others are in use (Pennestrì, Rossi, Salvini &
-    Valentini 2016), and none is a fault. They differ in how slowly the torque comes to its level:
-    what is missing falls with speed as an exponential, as 1/v², as 1/v. A diagnosis fits the
-    roundness r beside the width, so that no cause is found in the difference; where r is 1 it is
-    held. Root and arc tangent are laid as sigmoids, which a simulation takes at once.
+    A jump sign(v) would leave spikes in a fit whose speed passes zero a little early, and chatter
+    in a simulation: one smooth law in both. tanh (r = 1), the root (r = 2) and the arc tangent (r =
+    3) are all in use (Pennestrì, Rossi, Salvini & Valentini 2016), and none is a fault: a diagnosis
+    fits r beside the width 1/w; where r is 1 it is held.
     """
 
     sharpness: float = 100.0  # w [s/rad]
@@ -157,10 +148,8 @@ class _Sigmoids(_Curved, FrictionLaw):
 class ThreeSigmoid(_Sigmoids):
     """τ = Σ_k f_k (1 - 2/(exp(2 w_k v) + 1)) + b v = Σ_k f_k tanh(w_k v) + b v.
 
-    Kostić et al. 2004, eq. (10); the two forms are equal, and tanh never overflows. For given w it
-    is linear in f and b. A set is one of 48 equal ones, 3! orders times 2³ signs (f, w) -> (-f,
-    -w); w1 > w2 > w3 > 0 names it. A dip at low speed needs f of both signs. Compare curves, not
-    parameters.
+    Kostić et al. 2004, eq. (10). A set is one of 48 equal ones, 3! orders times 2³ signs; w1 > w2 >
+    w3 > 0 names it. A dip at low speed needs f of both signs. Compare curves, not parameters.
     """
 
     w1: float = 100.0  # [s/rad]
@@ -184,11 +173,9 @@ class ThreeSigmoid(_Sigmoids):
 
 @dataclass(frozen=True)
 class TwoSigmoid(_Sigmoids):
-    """τ = f_1 tanh(w_1 v) + f_2 tanh(w_2 v) + b v.
+    """τ = f_1 tanh(w_1 v) + f_2 tanh(w_2 v) + b v: eq. (10) with two terms of its three.
 
-    Kostić et al. 2004, eq. (10), with two terms of its three: a jump at zero speed, and a dip (f_2
-    < 0) or a slower rise (f_2 > 0) behind it. Two of three sigmoids that are nearly as sharp as
-    each other, against noise, are one of the sum of their heights: only that sum is seen.
+    A jump at zero speed, and a dip (f_2 < 0) or a slower rise (f_2 > 0) behind it.
     """
 
     w1: float = 60.0  # [s/rad]
@@ -212,11 +199,8 @@ class QuadraticDrag(Pointwise, FrictionLaw):
 class Stribeck(Pointwise, FrictionLaw):
     """τ = A (1 + (e^p - 1) |v/v_s|^n)^(-1/p) tanh(w v), beside Coulomb and viscous friction.
 
-    1/e of it is left at v_s.
-
     As p goes to 0 it is A exp(-|v/v_s|^n) tanh(w v): Armstrong-Hélouvry, Dupont & Canudas de Wit
-    1994, eq. (7); n = 1 is Tustin 1947. p = 1, n = 2 is Hess & Soom 1990. Three sigmoids of mixed
-    signs have the same hump, `ThreeSigmoid`.
+    1994, eq. (7); n = 1 is Tustin 1947. p = 1, n = 2 is Hess & Soom 1990.
     """
 
     speed: float = 0.1  # v_s [rad/s]
@@ -235,10 +219,7 @@ class Stribeck(Pointwise, FrictionLaw):
         return (left * m.tanh(self.sharpness * v),)
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """v_s from the slowest speeds of the motion to a third of the fastest.
-
-        Always slower than where the sign has changed.
-        """
+        """v_s from where the sign has changed to a third of the fastest speed."""
         slowest = EFFECTS.over / self.sharpness
         fastest = max(self.fastest(motion) / 3.0, 2.0 * slowest)
         for speed in np.geomspace(slowest, fastest, 8).tolist():
@@ -258,8 +239,7 @@ class ConcaveFriction(Pointwise, FrictionLaw):
     """τ = A tanh(v/v_0), or A x (1 + |x|^a)^(-1/a), x = v/v_0, beside Coulomb and viscous friction.
 
     The second is the shear of a lubricant whose viscosity falls as 1/|v| far above v_0: Yasuda,
-    Armstrong & Cohen 1981, with the knee a; a = 2 is Carreau 1972, and the smaller a, the more
-    gradually it levels off. v_0 lies well above the speeds at which Coulomb friction turns.
+    Armstrong & Cohen 1981, with the knee a; a = 2 is Carreau 1972.
     """
 
     speed: float = 1.0  # v_0 [rad/s]
@@ -293,14 +273,10 @@ class ConcaveFriction(Pointwise, FrictionLaw):
 
 @dataclass(frozen=True)
 class AsymmetricFriction(Pointwise):
-    """τ = ½ s (ΔFc tanh(w v) + ΔFv v).
+    """τ = ½ s (ΔFc tanh(w v) + ΔFv v), Δ the positive direction minus the negative one.
 
-    Δ is the positive direction's minus the negative one's, and s the direction.
-
-    Beside Fc tanh(w v) + Fv v these are Fc ± ½ ΔFc and Fv ± ½ ΔFv in the two directions: s = sign
-    v, each to the last; or they go over into each other as gradually as friction changes its sign,
-    s = tanh(w v), for a lip does not lift at once. A joint that creeps about standstill, |v| < 1/w,
-    tells the two apart.
+    s is sign v, or s = tanh(w v): the directions go over into each other as friction changes its
+    sign. A joint that creeps about standstill, |v| < 1/w, tells the two apart.
     """
 
     sharpness: float = 100.0  # w [s/rad]
@@ -319,10 +295,7 @@ class AsymmetricFriction(Pointwise):
 
 @dataclass(frozen=True)
 class ViscousDrift(Effect):
-    """τ = r Fv (1 - e^(-(t - t0)/T)) v.
-
-    Viscous friction Fv at the start of the log, (1 + r) Fv in the end.
-    """
+    """τ = r Fv (1 - e^(-(t - t0)/T)) v: from viscous friction Fv to (1 + r) Fv."""
 
     time_constant: float = 15.0  # T [s]
     # [s] clock time at which the session began, for a joint that is warm stays warm in the next
@@ -365,8 +338,7 @@ class ViscousDrift(Effect):
     def _viscous(self, arm: ArmModel) -> float:
         """Return Fv [N m s/rad] of the model, all else at rest.
 
-        Far above the speeds where friction changes sign, f(v) = Fc + Fv v + c v |v|: of the
-        torque's odd part, from three speeds v, 2v, 3v.
+        Where f(v) = Fc + Fv v + c v |v|, far above where the sign changes: from speeds v, 2v, 3v.
         """
         still = np.zeros((6, arm.n_joints))
         speed = self.on_own_row(arm, _FAST * np.array([1.0, 2.0, 3.0, -1.0, -2.0, -3.0]))[..., 0]

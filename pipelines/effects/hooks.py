@@ -95,9 +95,6 @@ class SpeedCurve:
     """A torque that depends on the speed of its own joint alone.
 
     τ = constant + viscous v + Σ height tanh(sharpness v)
-
-    What has this form the simulation computes for all joints at once, and for one robot without any
-    array.
     """
 
     constant: float = 0.0  # [N m]
@@ -147,14 +144,13 @@ def sign_curve(level: float, sharpness: float, roundness: float = 1.0) -> SpeedC
 class Hooks:
     """How an effect enters the forward simulation. Hooks left out change nothing.
 
-    The first axis of every array holds replicas, so that many simulations run at once. `states`
-    numbers of memory each replica keeps, zero or `start` at the start; `rate` moves them in
-    continuous time, `update` once per control sample (a delay line): after `sensor` was asked,
-    before the command acts. A command is the torque as it reaches this effect: of several the last
-    one meets it first. The motion handed in is the true one with ddq zero: what multiplies
-    acceleration goes to `inertia` or `arm`. Where a sensor is in error, `settled` says where the
-    arm truly is when it reads its first position, so that the run does not begin with a jump; it
-    and `start` are given the first acceleration too, as far as that is known.
+    The first axis of every array holds replicas. `states` numbers of memory each replica keeps,
+    zero or `start` at the start; `rate` moves them in continuous time, `update` once per control
+    sample, after `sensor` was asked and before the command acts. A command is the torque as it
+    reaches this effect: of several the last one meets it first. The motion handed in is the true
+    one with ddq zero: what multiplies acceleration goes to `inertia` or `arm`. `settled` says where
+    the arm truly is when its sensor reads the first position; it and `start` are given the first
+    acceleration where known.
     """
 
     # motion, states -> torque the drive must overcome [N m]
@@ -185,9 +181,8 @@ class DriveApart:
     J_m θ̈ = τ - τ_friction(θ̇) - τ_passed(θ - q, θ̇ - q̇)
 
     The arm that is simulated is the links, q; the angle θ - q by which the drive is ahead and its
-    speed θ̇ are two memories. Encoder and friction sit on the drive. Its inertia is that of a geared
-    rotor: it feels its own joint's acceleration, not that of the joints before it, which a disc of
-    J_m on a parallel axis would feel too.
+    speed θ̇ are two memories. Encoder and friction sit on the drive, whose inertia feels its own
+    joint's acceleration alone.
     """
 
     index: int  # joint, from 0
@@ -245,10 +240,7 @@ class DriveApart:
 
 
 def friction_at(arm: ArmModel, joint: int) -> Callable[[Motion, Array], Array]:
-    """Return the friction [N m] (samples,) of a joint (1-based) by motion and a speed of its own.
-
-    Made once for a simulation, which asks it at every step.
-    """
+    """Return the friction [N m] (samples,) of a joint (1-based) by motion and its own speed."""
     curves = arm.friction_curves(joint)
 
     def by_laws(motion: Motion, speed: Array) -> Array:
@@ -263,10 +255,7 @@ def friction_at(arm: ArmModel, joint: int) -> Callable[[Motion, Array], Array]:
 
 
 def summed(columns: Array, amplitudes: Array) -> Array:
-    """`columns` (samples, joints, k) times `amplitudes` (k,).
-
-    Of many samples, which lie side by side, a matrix product takes two to twenty times as long.
-    """
+    """Return `columns` (samples, joints, k) times `amplitudes` (k,); of many samples one by one."""
     if len(columns) < _MANY or not len(amplitudes):
         return np.asarray(columns @ amplitudes)
     parts = zip(np.moveaxis(columns, -1, 0), amplitudes.tolist(), strict=True)

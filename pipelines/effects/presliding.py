@@ -27,25 +27,20 @@ _FAST = 20.0  # numerics: times the speed over which a breakaway falls: nothing 
 
 @dataclass(frozen=True)
 class Presliding(Effect):
-    """τ = A (u + T_d du/dt): friction that turns over with travel, not with speed.
-
-    It takes the place of as much Coulomb friction.
+    """τ = A (u + T_d du/dt): friction that turns over with travel, in the place of Coulomb
+    friction.
 
     Along a stroke in direction s, y = s u bends with travel x = |q|/d by
 
         dy/dx = 1 up to y = e,  ((1 - y)/(1 - e))^n beyond
 
-    so that nothing slides up to e (Dupont, Hayward, Armstrong & Altpeter 2002, eq. (9)-(12), who
-    take e from 0 to 1). e = -1 is Dahl 1968 with his exponent n; with n = 1 and T_d = σ1/σ0 LuGre
-    of constant sliding friction (Canudas de Wit et al. 1995, eq. (1)-(3)). d is such that u is zero
-    x_c ln 2 after a reversal while sliding, as with Dahl's n = 1 and distance x_c.
+    Nothing slides up to e (Dupont, Hayward, Armstrong & Altpeter 2002, eq. (9)-(12)). e = -1 is
+    Dahl 1968 with his exponent n; with n = 1 and T_d = σ1/σ0 LuGre of constant sliding friction
+    (Canudas de Wit et al. 1995, eq. (1)-(3)). u is zero x_c ln 2 after a reversal while sliding.
 
-    Bristles know no more than how far they bend. Where inner loops close, elements that slip one
-    after the other stand in their place (Iwan 1966; Al-Bender, Lampaert & Swevers 2005): u = Σ w_i
-    z_i, dz_i = 2 dx/X_i within ±1, w_i and X_i such that a reversal while sliding goes as above.
-
-    With a breakaway b more friction at standstill than at speed, which falls over v_s (Canudas de
-    Wit et al. 1995, eq. (4)),
+    Where inner loops close, elements slip one after the other (Iwan 1966; Al-Bender, Lampaert &
+    Swevers 2005): u = Σ w_i z_i, dz_i = 2 dx/X_i within ±1. With a breakaway b, falling over v_s
+    (Canudas de Wit et al. 1995, eq. (4)),
 
         du/dt = v/x_c (1 - s u/h(v)),  h(v) = 1 + b exp(-(v/v_s)^2)
     """

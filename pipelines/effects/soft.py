@@ -39,9 +39,8 @@ class JointElasticity(Effect):
 
         x = -(τ_j - J_m q̈_j)/k,    τ = 1/k (P_j(-τ_j) + J_m P_j(q̈_j) - J_m ẍ k)
 
-    with P_j of the rigid arm, for friction does not feel the link. Exactly: x is solved from sample
-    to sample. The frequency is √(k/J)/2π, the motor locked, J the link's inertia averaged over the
-    motion.
+    Exactly, x is solved from sample to sample. The frequency is √(k/J)/2π, J the link's inertia
+    averaged over the motion, the motor locked.
     """
 
     damping: float = 0.0  # d [N m s/rad]
@@ -126,13 +125,10 @@ class JointElasticity(Effect):
 
 @dataclass(frozen=True)
 class BaseResonance(Effect):
-    """I (ẍ + 2 ζ w ẋ + w² x) = -τ_1, w = 2πf.
-
-    The base turns by x about the first joint's axis, and the arm with it.
+    """I (ẍ + 2 ζ w ẋ + w² x) = -τ_1, w = 2πf: the base turns by x about the first joint's axis.
 
     τ_1 is the rigid arm's torque on that joint; its encoder and its friction turn with the base. To
-    first order τ = 1/I P_1(x I) with τ_1 of the arm on a firm base; exactly, of the arm as it then
-    moves.
+    first order τ = 1/I P_1(x I) with τ_1 of the arm on a firm base.
     """
 
     frequency: float = 28.0  # f [Hz]

@@ -1,7 +1,5 @@
 """Forward dynamics: D⁻¹(q) and c(q, dq) + h(q) of arms of one kind, of many replicas at once.
 
-D(q) a = τ - c(q, dq) - h(q). What `hold` returns may serve for states nearby.
-
 `closed_form`: Kostić et al. 2004, (A5), of RRR arms, in plain numbers or in arrays.
 
 `Chains`: the trace form of the equations of motion of any serial arm, eq. (5)-(7), after Paul
@@ -11,8 +9,7 @@ S_j the matrix of joint j's twist, all in the base frame,
     ∂T_i/∂q_j = S_j T_i,      V_i = Σ_{j≤i} S_j q̇_j,      A_i = Σ_{j≤i} (V_j S_j - S_j V_j) q̇_j
     D_jk = tr(S_j Σ_{i≥k} P_i S_kᵀ), j ≤ k,      bias_j = tr(S_j Σ_{i≥j} P_i (A_i + V_i² - g)ᵀ)
 
-the sums over links being cumulative. Replicas are the last axis, links the one before it: NumPy is
-fastest on rows of neighbours.
+Replicas are the last axis, links the one before it: NumPy is fastest on rows of neighbours.
 """
 
 from __future__ import annotations
@@ -166,8 +163,8 @@ def _moments(values: Array) -> Array:
 def closed_form(body: RRR, p: Array, added: Array, m: Functions) -> Callable[..., tuple[Any, ...]]:
     """Return (q2, q3, dq1, dq2, dq3) -> D⁻¹ 11 12 13 22 23 33 and c + h, in numbers or arrays.
 
-    Kostić et al. 2004, (A5), D inverted by its cofactors; terms that its elements share are worked
-    out once. A closure holds the arm's numbers: attributes would cost a third more.
+    Kostić et al. 2004, (A5), D inverted by its cofactors. A closure holds the arm's numbers:
+    attributes would cost a third more.
     """
     sin, cos = m.sin, m.cos
     p1, p2, p3, p4, p5, p6, p7, p8, p9, p10, p11, p12, p13, p14, p15 = p.tolist()

@@ -2,7 +2,8 @@
 
     pd               τ = -Kp ē - Kd dē - Ki ∫e + v                                    eq. (23)
     pd+feedforward   the same, and parts of the model's torque on the reference       eq. (24)
-    computed-torque  τ = D(q̄) r + c(q̄, dq̄) + h(q̄) + τ_f(dq_r)                       eq. (25)-(27)
+    computed-torque  τ = D(q̄) r + c(q̄, dq̄) + h(q̄) + τ_f(dq_r)                       eq.
+    (25)-(27)
                      r = -Kp ē - Kd dē - Ki ∫e + v
 
 e = q - q_r. ē and dē come from the observer, eq. (20)-(21), which filters e and starts with zero
