@@ -1,16 +1,13 @@
 """Change a design until it separates two causes: least similarity of what the model cannot imitate.
 
-    pair = Pair(a, b)
-    refuse_hidden(task, pair, seed)
     design, apart = best(task, pair, Effort(seconds=30), seed)
     apart.before.similarity, apart.after.similarity
 
 With c⊥ = c - Q Qᵀ c the part of a cause's columns that rigid body and friction cannot imitate,
 weighted by the noise, cause A is as similar to B as the length of A⊥ within the span of B⊥ over its
-whole length, root mean square over A's columns. Of the two directions the smaller one counts: where
-B can be all that A can, a bit of it besides shows B, and else the one with fewer numbers wins.
-Causes with non-linear numbers are taken in a few of their shapes, and the pair that is most alike
-counts; a shape that the nominal model takes up whole shows in no motion, and is left out.
+whole length. Of the two directions the smaller one counts: where B can be all that A can, the one
+with fewer numbers wins. Causes with non-linear numbers are taken in a few shapes, of which the most
+alike pair counts; a shape that the nominal model takes up whole is left out.
 """
 
 from __future__ import annotations
@@ -144,8 +141,7 @@ def told_apart(task: Task, designed: Design, pair: Pair, effort: Effort,
                seed: int) -> tuple[Design, Apart]:
     """Change `designed` step by step for the better, its ceiling on the condition number kept.
 
-    The finished motion, which keeps its limits between all samples, is judged as it is. Where it
-    gained nothing, the plain design is returned.
+    The finished motion is judged as it is; where it gained nothing, the plain design is returned.
     """
     assert task.arm is not None  # `refuse_hidden`
     problem = landscape(task)

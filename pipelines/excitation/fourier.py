@@ -1,12 +1,10 @@
 """Describe motions as Fourier series, at rest at both ends or reached by a run-in.
 
 A point x of `MotionSpace` holds, for every joint, [q0, a_1 … a_H, b_1 … b_H] of Kostić et al.
-2004, eq. (22), each divided by a scale: the speed the joint may have, over √(1 + (f_j / 0.6 Hz)²):
-a step in x is about as much torque at every frequency. Start and end at rest at home are
+2004, eq. (22), each divided by the speed the joint may have over √(1 + (f_j / 0.6 Hz)²): a step in
+x is about as much torque at every frequency. Start and end at rest at home are
 
     Σ a_j = 0,    Σ w_j b_j = 0,    q0 - Σ b_j/w_j = home
-
-onto which every step is projected.
 """
 
 from __future__ import annotations
@@ -180,8 +178,8 @@ def quintics(knots: Sequence[tuple[float, Array]], t: Array) -> Array:
     """Return q, dq, ddq (3, joints, samples) of polynomials of fifth order between states.
 
     Args:
-        knots: times [s] and states (3, joints) of position, speed and acceleration there; the
-            last state is kept after them.
+        knots: times [s] and states (3, joints) of position, speed and acceleration; the last is
+        kept.
     """
     from scipy.interpolate import BPoly
 

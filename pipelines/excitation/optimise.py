@@ -2,12 +2,10 @@
 
     found = design(task, Effort(seconds=30), seed=1)
 
-Random starts are refined on a coarse copy of the problem, a fifth of the harmonics, where an
-evaluation costs next to nothing; their figure there predicts the final one. The
-best are lifted to the fine problem and refined by L-BFGS while the smooth criterion is sharpened
-and the barrier lowered. They join a pool, whose best members are disturbed a little and refined
-again; then come the next starts. With a number of evaluations nothing looks at a clock: equal
-numbers give equal designs.
+Random starts are refined on a coarse copy of the problem, a fifth of the harmonics. The best are
+lifted to the fine problem and refined by L-BFGS while the smooth criterion is sharpened and the
+barrier lowered. They join a pool, whose best members are disturbed a little and refined again; then
+come the next starts. With a number of evaluations equal numbers give equal designs.
 """
 
 from __future__ import annotations
@@ -90,11 +88,8 @@ class _Search:
 
     def descend(self, land: DesignProblem, x: Array, rounds: Sequence[Round],
                 best: bool) -> tuple[float, Array]:
-        """Refine x; return the best exact figure on the way and its point.
-
-        Args:
-            best: whether points of `land` may be the answer.
-        """
+        """Refine x; return the best exact figure on the way and its point; `best`: it may be the
+        answer."""
         from scipy.optimize import minimize
 
         own: tuple[float, Array] = (np.inf, x)

@@ -4,10 +4,8 @@
     frf         one joint turning slowly there and back, with an odd random-phase multisine, twice
     hold        static postures that together determine gravity best
 
-The multisine has odd lines of which one in four is missing. An even power of the motion shows at
-even lines, an odd power at the missing ones; differences between realisations of other phases are
-distortion, differences between periods noise (Pintelon, Schoukens 2012, System Identification,
-§4.3.1; Schoukens et al. 2005, Automatica 41, on random grids of odd lines).
+The multisine has odd lines of which one in four is missing, to tell even and odd powers from noise
+(Pintelon, Schoukens 2012, System Identification, §4.3.1; Schoukens et al. 2005, Automatica 41).
 """
 
 from __future__ import annotations

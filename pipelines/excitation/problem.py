@@ -2,9 +2,7 @@
 
     x → motion → signals within limits, rows of the equations → Gram matrices → criterion
 
-and back: the derivative by the Gram matrices becomes one by the rows, 2/n A S̄, that one by the
-motion (the rows' adjoint), that one by x (the series' adjoint). One pass there and back costs about
-three evaluations, for any number of harmonics.
+and back. One pass there and back costs about three evaluations, for any number of harmonics.
 """
 
 from __future__ import annotations
@@ -119,10 +117,8 @@ class DesignProblem:
         self.half = half - (1.0 - room) * np.where(position, np.minimum(half, 1.0), half)
 
     def value(self, x: Array, sharpness: float, weight: float) -> tuple[float, Array, float]:
-        """Return the criterion with its barrier, the gradient, and the exact figure.
-
-        The figure is infinite outside the limits.
-        """
+        """Return the criterion with its barrier, the gradient, and the figure, infinite outside
+        limits."""
         arm = self.arm
         motion, rows, signals, tip = self._evaluated(x)
         wall, on_signals, inside = barrier(signals, self.middle, self.half)

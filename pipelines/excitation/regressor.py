@@ -1,14 +1,13 @@
 """Compute the rows of the regressor along a motion, and the adjoint of that map.
 
-τ_j = rows_jᵀ p[columns_j], joint by joint, without columns that are always zero. A criterion L
-depends on the motion through the rows; from its derivatives by them, R̄, the adjoint gives
+τ_j = rows_jᵀ p[columns_j], joint by joint, without columns that are always zero. From the
+derivatives R̄ of a criterion by the rows, the adjoint gives
 
     q̄ = Σ R̄ ∂R/∂q,   dq̄ = Σ R̄ ∂R/∂dq,   ddq̄ = Σ R̄ ∂R/∂ddq
 
-`RRRRows` differentiates Kostić et al. 2004, eq. (A5), by hand, with the letters of that equation.
-`ChainRows` runs the recursion of any serial arm backwards: velocity V, acceleration A and the
-twists U of all joints walk out along the chain, and the entry of joint j for parameter c of link i
-is y_jc = U_j · W_c(V, A), with the wrench
+`RRRRows` differentiates Kostić et al. 2004, eq. (A5), by hand. `ChainRows` runs the recursion of
+any serial arm backwards: with velocity V, acceleration A and the twists U of all joints, the entry
+of joint j for parameter c of link i is y_jc = U_j · W_c(V, A), with the wrench
 
     n = h × a + I α + ω × I ω,   f = m a + S h,   S = [α]× + [ω]×²,   a = A_linear + ω × v
 

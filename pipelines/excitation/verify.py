@@ -1,9 +1,8 @@
 """Verify a finished motion on a fine grid: its peaks between samples too.
 
-Position, speed and acceleration of a periodic motion are trigonometric polynomials, whose bound
-holds rigorously (`fourier.periodic_peak`). Torque and tip are smooth but no polynomials: to each
-of their samples half the step to its neighbour is added, which on a grid of 0.1 ms exceeds what
-can lie between.
+The bound of position, speed and acceleration of a periodic motion holds rigorously
+(`fourier.periodic_peak`). To samples of torque and tip half the step to their neighbour is added,
+which on a grid of 0.1 ms exceeds what can lie between.
 """
 
 from __future__ import annotations

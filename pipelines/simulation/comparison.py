@@ -84,10 +84,9 @@ def nearer(before: Simulation, after: Simulation) -> bool:
 def simulation_errors(arms: Sequence[Arm], motions: Motions) -> list[Simulation]:
     """Return the position error of each arm over the same stretches of logs.
 
-    The arms run in closed loop where the first allows it, over short windows else; nothing without
-    logs. In a loop the stretches are short, and longer ones where they leave it open whether the
-    last arm comes nearer than the first: what the amplifiers' noise moves, no simulated arm
-    follows.
+    In closed loop where the first arm allows it, over short windows else; nothing without logs. In
+    a loop stretches are short, and longer where they leave it open whether the last arm comes
+    nearer.
     """
     none = [Simulation.none(arm.n_joints) for arm in arms]
     logs = motions[: SIMULATION.logs]
@@ -122,10 +121,10 @@ def in_loop(arm: Arm, log: ExperimentLog) -> bool:
 
 
 def in_loops(arms: Sequence[Arm], motions: Motions, seconds: float) -> list[list[Positions] | None]:
-    """Return the positions of each arm in each log, over its first `seconds`.
+    """Return the positions of each arm in each log over its first `seconds`; None of one that
+    fails.
 
-    The entry of an arm that runs away, or that cannot be simulated, is None. The step that suffices
-    for one log is used for all: they have one controller and arm.
+    The step that suffices for one log is used for all: they have one controller and arm.
 
     Raises:
         InputRejected: a log does not describe its controller.

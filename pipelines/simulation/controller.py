@@ -6,10 +6,9 @@
     (25)-(27)
                      r = -Kp ē - Kd dē - Ki ∫e + v
 
-e = q - q_r. ē and dē come from the observer, eq. (20)-(21), which filters e and starts with zero
-error, or are e itself and its backward difference. q̄ = q_r + ē and dq̄ are the observer's wherever
-the log gives its gains. Friction is compensated at the speed of the reference: at the measured one
-it would chatter on a joint at rest.
+e = q - q_r. ē and dē come from the observer, eq. (20)-(21), which filters e, or are e itself and
+its backward difference; q̄ = q_r + ē and dq̄ are the observer's where the log gives its gains.
+Friction is compensated at the speed of the reference: at the measured one it would chatter.
 """
 
 from __future__ import annotations

@@ -102,9 +102,7 @@ def periodic_peak(samples: Array) -> tuple[Array, Array]:
     """Bounds (lowest, highest) of periodic signals between their samples (…, count) as well.
 
     A trigonometric polynomial of degree K stays, between M equal samples, within 1/cos(πK/M) of its
-    largest one (Ehlich & Zeller 1964). A signal that is none has a degree beyond which its
-    amplitudes add up to next to nothing; they are added. The middle of the signal is left out of
-    the factor: a bound is as near as the swing allows.
+    largest one (Ehlich & Zeller 1964). Of another signal the amplitudes beyond a degree are added.
     """
     count = samples.shape[-1]
     low, high = samples.min(axis=-1), samples.max(axis=-1)

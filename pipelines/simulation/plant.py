@@ -1,12 +1,9 @@
 """The arm as a thing that moves: rigid body, friction and effects put together.
 
-    plant = Plant.of(arm)
-    moving = plant.prepared(replicas)            with working memory
+    moving = Plant.of(arm).prepared(replicas)            with working memory
     ddq, rates = moving.accelerations(t, q, dq, states, command)
 
-Effects enter through their hooks, in the order in which they act. What follows from angle and
-speed of one joint is a function of numbers or arrays; friction that is a curve of speed alone is
-gathered for all joints.
+Effects enter through their hooks, in the order in which they act.
 """
 
 from __future__ import annotations

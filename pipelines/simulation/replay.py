@@ -1,8 +1,7 @@
 """Simulate short windows open loop, from where a smoother saw the arm: for unknown controllers.
 
-Every window starts at the reconstructed position and speed and follows the logged torque; all
-windows run at once. Without feedback an error grows with the square of time, so that windows must
-be short, and their error is one of position after that time, no tracking error.
+Every window follows the logged torque; all run at once. Without feedback an error grows with the
+square of time: it is one of position after that time, no tracking error.
 """
 
 from __future__ import annotations

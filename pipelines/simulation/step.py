@@ -2,10 +2,8 @@
 
     simulated = simulate(arm, experiment, noise, seeds=range(10))
 
-The error is measured, not guessed: stretches of the experiment are run with m steps a sample and
-with 2 m of Runge-Kutta, without noise and without quantisation, whose flips would hide it; two runs
-with different noise say what may be wrong. A body that is held costs less a step: it is tried
-first.
+The error is measured: stretches of the experiment are run with m steps a sample and with 2 m,
+without noise and quantisation; two runs with different noise say what may be wrong.
 """
 
 from __future__ import annotations
