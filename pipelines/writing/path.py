@@ -19,7 +19,7 @@ import numpy as np
 
 from pipelines.dynamics.body import Array
 from pipelines.errors import UsageError
-from pipelines.writing.letters import CHARACTERS, glyph
+from pipelines.writing.letters import glyphs
 
 __all__ = ["Arc", "Joint", "Line", "Page", "Piece", "TipPath", "lay_out"]
 
@@ -145,19 +145,19 @@ def lay_out(text: str, page: Page) -> TipPath:
     Raises:
         UsageError: C02, a character has no form here, or nothing is to be drawn.
     """
-    glyphs = []
+    known_forms, forms = glyphs(), []
     for k, character in enumerate(text):
-        if (known := glyph(character)) is None:
+        if (known := known_forms.get(character.upper())) is None:
             raise UsageError(
                 "C02",
                 f"letter {k + 1} of the text, '{character}', cannot be written",
                 where="text",
                 remedy="write with the letters A to Z, digits and spaces",
             )
-        glyphs.append(known)
-    left = -0.5 * (sum(known.width for known in glyphs) + page.gap * (len(glyphs) - 1))
+        forms.append(known)
+    left = -0.5 * (sum(known.width for known in forms) + page.gap * (len(forms) - 1))
     pieces: list[Piece] = []
-    for letter, known in enumerate(glyphs):
+    for letter, known in enumerate(forms):
         for stroke in known.strokes:
             at = page.point(left + stroke[0][0], stroke[0][1] - 0.5)
             pieces += _move(pieces, at, letter, page.lift)
@@ -183,7 +183,7 @@ def lay_out(text: str, page: Page) -> TipPath:
             "C02",
             "there is nothing to write",
             where="text",
-            remedy=f"give at least one of {CHARACTERS.strip()}",
+            remedy="give at least one letter or digit",
         )
     return TipPath(text, page, tuple(pieces))
 
