@@ -18,12 +18,13 @@ from __future__ import annotations
 from benchmarks.side_by_side import HEADER, race, row  # isort: skip  # before numpy
 
 import argparse
+import math
 import statistics
+from collections.abc import Callable
 
 import numpy as np
 
 from benchmarks.textbook_kalman import ExtendedTextbook
-from pipelines.friction.ekf import joint_step
 from pipelines.friction.fit import LawFit
 from pipelines.friction.laws import OneJoint, law_named
 from pipelines.friction.refine import fit_driven_alone
@@ -39,9 +40,50 @@ from tests.friction.one_joint import (
     relative,
 )
 
+PARTS = 2  # midpoint steps a sample
+CONSTANT = 11  # place of c'
+Advance = Callable[[np.ndarray, float], tuple[np.ndarray, np.ndarray]]
+
 ROUNDS = {"one call": 1, "refined twice": 2}
 STATES = np.array([0.0, 0.0, 1.0 / INERTIA, SINE, 0.4, 1.2, -0.4, 120.0, 60.0, 12.0, 0.12, 0.35])
 STD = np.array([ENCODER, 0.01, 2.0, 0.4, 0.3, 0.4, 0.2, 30.0, 20.0, 5.0, 0.05, 0.2])
+
+
+def joint_step(step: float) -> Advance:
+    """Return one sample of eq. (11) and (10) by midpoint steps, with its derivatives."""
+    h = step / PARTS
+
+    def acceleration(x: list[float], q: float, v: float,
+                     u: float) -> tuple[float, float, float, list[float]]:
+        """Return a, ∂a/∂q, ∂a/∂v, and ∂a/∂ of the constants."""
+        theta, c, f1, f2, f3, w1, w2, w3, b = x[2:11]
+        d = x[CONSTANT] if len(x) > CONSTANT else 0.0
+        s, o = math.sin(q), math.cos(q)
+        t1, t2, t3 = math.tanh(w1 * v), math.tanh(w2 * v), math.tanh(w3 * v)
+        e1, e2, e3 = 1.0 - t1 * t1, 1.0 - t2 * t2, 1.0 - t3 * t3
+        rest = u - c * s - d * o - f1 * t1 - f2 * t2 - f3 * t3 - b * v
+        own = [rest, -theta * s, -theta * t1, -theta * t2, -theta * t3, -theta * f1 * e1 * v,
+               -theta * f2 * e2 * v, -theta * f3 * e3 * v, -theta * v, -theta * o]
+        return (theta * rest, theta * (d * s - c * o),
+                -theta * (f1 * w1 * e1 + f2 * w2 * e2 + f3 * w3 * e3 + b), own[:len(x) - 2])
+
+    def advance(x: np.ndarray, u: float) -> tuple[np.ndarray, np.ndarray]:
+        values = x.tolist()
+        q, v = values[:2]
+        (dq, dv), change = np.eye(2, len(x)), np.zeros(len(x))
+        for _ in range(PARTS):
+            a, aq, av, change[2:] = acceleration(values, q, v, u)
+            q_mid, v_mid = q + 0.5 * h * v, v + 0.5 * h * a
+            dq_mid = dq + (0.5 * h) * dv
+            dv_mid = dv + (0.5 * h) * (aq * dq + av * dv + change)
+            a, aq, av, change[2:] = acceleration(values, q_mid, v_mid, u)
+            q, v = q + h * v_mid, v + h * a
+            dq, dv = dq + h * dv_mid, dv + h * (aq * dq_mid + av * dv_mid + change)
+        ahead = x.copy()
+        ahead[:2] = q, v
+        return ahead, np.stack([dq, dv])
+
+    return advance
 
 
 def ours(y: np.ndarray, tau: np.ndarray, rounds: int) -> LawFit:

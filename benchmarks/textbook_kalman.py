@@ -76,7 +76,7 @@ class Textbook:
 class ExtendedTextbook:
     """filterpy's extended filter of which the first state is measured.
 
-    `advance` as in `pipelines.friction.extended_filter`.
+    `advance(x, u)` gives the next states and the rows of the Jacobian of those that move.
     """
 
     advance: Callable[[Array, float], tuple[Array, Array]]

@@ -1,7 +1,7 @@
 """Fit the friction law of each joint, and choose it.
 
 Reads    "friction" logs of role "identify", each of one joint driven alone; those of role
-         "validate" judge; "hold" logs; without them "excitation" and "free" logs: friction then is
+         "validate" judge; without them "excitation" and "free" logs: friction then is
          fitted with the base parameters
 Writes   result.json, result.h5, model.json with the friction, logs/ with its torque, report.html
 Source   Kostić et al. 2004, Section IV.B, eq. (10)-(11), Table III, Figs. 5 and 6
@@ -28,11 +28,9 @@ from pipelines.estimation.result import validity
 from pipelines.friction.config import FolderConfig
 from pipelines.friction.findings import findings_of, misfits
 from pipelines.friction.joint import (
-    METHODS,
     JointFit,
     JointLogs,
     Seen,
-    by_method,
     fit_joint,
     friction_of,
 )
@@ -58,11 +56,10 @@ WINDOWS = (1e-3, 1.0)  # numerics: [s] shortest and longest window of the equati
 
 @dataclass(frozen=True)
 class Settings:
-    """Law, method and windows of the fit."""
+    """Law and windows of the fit."""
 
     law: str | None = option(
         None, "Law to fit, as the report names it. [the simplest that is not worse]")
-    method: str = option("varpro", "varpro, or ekf (Kostić et al. 2004).")
     window: float = option(FolderConfig.window, "Windows of the equations [s], the shortest.")
     order: int = Reconstruction.order  # of the smoother that motion begins with
     together: bool = True  # where no joint was driven alone: friction with the base parameters
@@ -78,9 +75,9 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     """
     law = _law(settings)
     measured = [opened.log for opened in inputs.logs if opened.log.origin != "planned"]
-    logs = [log for log in measured if log.experiment in ("friction", "hold")]
+    logs = [log for log in measured if log.experiment == "friction"]
     moving = [log for log in measured if log.experiment in MOVING]
-    identify = [log for log in logs if log.role == "identify" and log.experiment == "friction"]
+    identify = [log for log in logs if log.role == "identify"]
     together = any(log.role == "identify" for log in moving)
     if not identify and together and settings.together:
         return _together(moving, settings, law, inputs.label)
@@ -92,12 +89,11 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
             "C06", f"no friction log of role identify; there are: {there}", where=inputs.label,
             remedy="drive each joint alone, the others held, and record it as "
             f"experiment 'friction'{also}")
-    used = [log for log in logs if log.experiment == "hold" or log.role in ("identify", "validate")]
+    used = [log for log in logs if log.role in ("identify", "validate")]
     seen, checks = _examined(used, Reconstruction(order=settings.order))
-    joints = [by_method(fit_joint(part, settings.window, law), settings.method)
-              for part in _by_joint(seen)]
+    joints = [fit_joint(part, settings.window, law) for part in _by_joint(seen)]
     robot = identify[0].robot
-    results = tuple(joint_result(joint, robot.joints[joint.logs.joint - 1].name, settings.method)
+    results = tuple(joint_result(joint, robot.joints[joint.logs.joint - 1].name)
                     for joint in joints)
     for joint, result in zip(joints, results, strict=True):
         checks += findings_of(joint, result)
@@ -118,9 +114,6 @@ def _together(logs: list[ExperimentLog], settings: Settings, law: Law | None,
               label: str) -> Result:
     """Fit friction with the base parameters, from logs in which all joints move."""
     how = Reconstruction(order=settings.order)
-    if settings.method != "varpro":
-        raise UsageError("C02", f"'{settings.method}' needs joints that were driven alone",
-                         where="--method", remedy="take varpro")
     if law is not None and (law.sees_load or not law.pointwise):
         raise UsageError("C02", f"{law.name} cannot be fitted while all joints move",
                          where="--law", remedy="drive each joint alone, or choose a law of speed "
@@ -140,9 +133,6 @@ def _together(logs: list[ExperimentLog], settings: Settings, law: Law | None,
 
 def _law(settings: Settings) -> Law | None:
     """Return the law to fit; None: choose one."""
-    if settings.method not in METHODS:
-        raise UsageError("C02", f"'{settings.method}' is no method", where="--method",
-                         remedy=f"one of {', '.join(METHODS)}")
     shortest, longest = WINDOWS
     if not shortest <= settings.window <= longest:
         raise UsageError("C02", f"windows of {settings.window:g} s", where="--window",
@@ -170,12 +160,11 @@ def _examined(logs: Sequence[ExperimentLog],
 
 
 def _by_joint(seen: Sequence[Seen]) -> list[JointLogs]:
-    hold = tuple(pair for pair in seen if pair[0].experiment == "hold")
     parts: dict[tuple[int, str], list[Seen]] = {}
     for pair in seen:
-        if pair[0].experiment == "friction" and pair[0].joint is not None:
+        if pair[0].joint is not None:
             parts.setdefault((pair[0].joint, pair[0].role), []).append(pair)
-    return [JointLogs(joint, tuple(own), tuple(parts.get((joint, "validate"), ())), hold)
+    return [JointLogs(joint, tuple(own), tuple(parts.get((joint, "validate"), ())))
             for (joint, role), own in sorted(parts.items()) if role == "identify"]
 
 
@@ -237,7 +226,7 @@ def _onward(result: Result, inputs: Inputs) -> Inputs:
 
 def _reads(log: ExperimentLog, settings: Settings) -> bool:
     moving = settings.together and log.experiment in MOVING
-    return log.experiment in ("friction", "hold") or moving
+    return log.experiment == "friction" or moving
 
 
 def _exit_code(result: Result, check: bool) -> int:

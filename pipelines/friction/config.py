@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["BreakAwayConfig", "DriftConfig", "EkfConfig", "FindingsConfig", "FitConfig",
-           "FolderConfig", "JointConfig", "LadderConfig", "RefineConfig", "SimulationConfig",
-           "SlidingConfig", "SpeedConfig", "WeakFormConfig"]
+__all__ = ["DriftConfig", "FindingsConfig", "FitConfig", "FolderConfig", "JointConfig"]
+__all__ += ["LadderConfig", "RefineConfig", "SimulationConfig", "SlidingConfig", "SpeedConfig"]
+__all__ += ["WeakFormConfig"]
 
 
 @dataclass(frozen=True)
@@ -60,12 +60,9 @@ class LadderConfig:
 class JointConfig:
     """Numbers of the fit of one joint."""
 
-    bent: float = 1e-3  # of friction: a curve that bends less does not show whether it lags
     memory: float = 1.0  # [s] over which errors of a law may depend: a joint moves some way in it
-    courses: int = 5  # steps of Gauss and Newton for the time constant of a drift
-    rounds: int = 2  # of refining before laws are compared
+    courses: int = 3  # rounds of fitting a curve and its change
     curve: int = 100  # points of a curve, each way, from 1e-3 of the fastest speed on
-    fastest: int = 9  # of them, that give its slope at the highest speeds: the upper half
 
 
 @dataclass(frozen=True)
@@ -131,27 +128,13 @@ class SimulationConfig:
 
 @dataclass(frozen=True)
 class SpeedConfig:
-    """Classes of speed and position, and what logs should cover."""
+    """Classes of speed, and what logs should cover."""
 
     classes: int = 5  # of speed, a decade
     enough: int = 5  # rows that fill a class
     decades: float = 1.6  # and
     speeds: int = 7  # classes each way that are enough
     vague: float = 0.5  # of a value, its standard deviation: hardly known
-    places: int = 36  # of position, a turn
-    slowest: float = 1e-3  # of the fastest speed, of a pair
-    fewest: int = 2  # pairs for a point
-
-
-@dataclass(frozen=True)
-class BreakAwayConfig:
-    """Limits that make a break-away; choices, not measured."""
-
-    creep: float = 5e-3  # of the fastest speed
-    rest: float = 0.1  # [s] rest before a break-away
-    runs: float = 5.0  # times the creeping speed: the joint runs
-    within: float = 1.0  # [s] from creeping to running, or it was no break-away
-    smooth: float = 0.01  # [s] mean over which torque is taken
 
 
 @dataclass(frozen=True)
@@ -163,17 +146,6 @@ class FindingsConfig:
     nothing: float = 0.01  # of the torque (std): no gravity; a choice, not measured
     coarse: float = 0.05  # bias of the inertia by errors in variables; a choice, not measured
     poor: float = 0.5  # of the held-out torque (rms): a quarter of its power is not described
-
-
-@dataclass(frozen=True)
-class EkfConfig:
-    """The start of the extended Kalman filter."""
-
-    parts: int = 2  # midpoint steps a sample
-    passes: int = 2  # over a log, each from the constants of the last one
-    shares: tuple[float, ...] = (0.3, 0.8, -0.1)  # of Coulomb friction: the sigmoids
-    sharp: tuple[float, ...] = (100.0, 40.0, 10.0)  # [s/rad] their sharpness
-    unsure: float = 0.5  # of Coulomb friction, and of each sharpness
 
 
 @dataclass(frozen=True)

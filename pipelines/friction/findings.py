@@ -130,8 +130,6 @@ def drift_in_words(joint: JointResult) -> str:
     time, middle = plain_number(drift.when), plain_number(drift.holds_at)
     if drift.kind == "step":
         return f"{start} at once, {time} s into {drift.log}; the law is that before."
-    if drift.when_std is not None:
-        time += f" ± {plain_number(drift.when_std)}"
     return (f"{start} of its value at {middle} s in the course of each log, with a time constant "
             f"of {time} s; the law holds at {middle} s.")
 

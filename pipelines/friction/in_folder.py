@@ -74,10 +74,9 @@ def _driven_alone(logs: Sequence[ExperimentLog], how: Reconstruction) -> tuple[A
     joints = range(1, logs[0].n_joints + 1)
     if {log.joint for log in alone} != set(joints):
         return ()
-    still = tuple((log, reconstruct(log, how)) for log in logs if log.experiment == "hold")
     moved = [(log, reconstruct(log, how)) for log in alone]
     fits = []
     for j in joints:
         own = tuple(pair for pair in moved if pair[0].joint == j)
-        fits.append(fit_joint(JointLogs(j, own, (), still), _CONFIG.window))
+        fits.append(fit_joint(JointLogs(j, own), _CONFIG.window))
     return friction_of(fits, logs[0].robot)[0]

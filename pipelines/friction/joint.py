@@ -20,12 +20,11 @@ from pipelines.effects import find_effect
 from pipelines.errors import InputRejected
 from pipelines.estimation.motion import Reconstructed, encoder_resolution
 from pipelines.estimation.varpro import with_block_covariance
-from pipelines.friction.breakaway import Event, break_away, held_at_least
 from pipelines.friction.config import JointConfig, SlidingConfig
-from pipelines.friction.ekf import filtered
-from pipelines.friction.fit import LawEquations, LawFit, fit_law, same_posture
+from pipelines.friction.coverage import Coverage, coverage, unseen
+from pipelines.friction.fit import LawEquations, LawFit, fit_law
 from pipelines.friction.laws import LADDER, Law, OneJoint, gravity_columns
-from pipelines.friction.model_selection import Ladder, Missing, climb, no_worse
+from pipelines.friction.model_selection import Ladder, Missing, climb
 from pipelines.friction.refine import refined
 from pipelines.friction.simulation import Simulated, simulate_joint
 from pipelines.friction.sliding import (
@@ -34,7 +33,6 @@ from pipelines.friction.sliding import (
     left_out,
     sliding_rows,
 )
-from pipelines.friction.speed_map import Coverage, coverage, speed_map, unseen
 from pipelines.friction.weak_form import (
     Course,
     Mask,
@@ -46,10 +44,8 @@ from pipelines.friction.weak_form import (
 from pipelines.io.log import ExperimentLog
 from pipelines.io.robot import RobotDescription
 
-__all__ = ["METHODS", "JointFit", "JointLogs", "Seen", "by_method", "fit_joint", "fractions",
-           "friction_of"]
+__all__ = ["JointFit", "JointLogs", "Seen", "fit_joint", "fractions", "friction_of"]
 
-METHODS = ("varpro", "ekf")
 # follows any curve: no law of the ladder is favoured
 _FLEXIBLE = Law("flexible", ("three_sigmoid", "asymmetric_friction"))
 
@@ -67,7 +63,6 @@ class JointLogs:
     joint: int
     identify: tuple[Seen, ...]
     validate: tuple[Seen, ...] = ()
-    hold: tuple[Seen, ...] = ()
 
     @property
     def resolution(self) -> float:
@@ -113,9 +108,6 @@ class JointFit:
     driven: Driven
     covered: Coverage
     unseen: tuple[Missing, ...]
-    map: Array  # (4, points) of `speed_map`
-    break_away: tuple[Event, ...]
-    held: tuple[float, float] | None  # [N m] friction carried at rest, back and forth
     window: float  # [s]
     sliding: Sliding
     course: Course | None  # of friction that changes in time
@@ -139,33 +131,26 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None) -> JointFi
     stretches, fit = _refined(left_out(usable, moves), fitted, arm, logs.resolution)
     if slide and not _followed(stretches, fit, sliding.slides[moves]):
         stretches = left_out(usable, sliding.slides)
-    shown = drift_of(left_out(stretches, sliding.slides)[:fitted], arm) if slide else None
-    course = shown if shown is not None and shown.named else None
-    choice = _choice(stretches, fitted, course, fit, arm, law)
-    if shown is not course:  # neither shown nor excluded: it takes part where the law is better
-        other = _choice(stretches, fitted, shown, fit, arm, choice.ladder.chosen.law)
-        if not no_worse(choice.ladder.chosen.residual, other.ladder.chosen.residual):
-            choice = _choice(stretches, fitted, shown, fit, arm, law)
-    both, course, chosen = choice.stretches, choice.course, choice.ladder.chosen.fit
-    sticks = any(stretch.sticks is not None for stretch in both[:fitted])
+    course = drift_of(left_out(stretches, sliding.slides)[:fitted], arm) if slide else None
+    stretches, _ = _with_course(stretches, fitted, course, fit, arm)
+    identify = stretches[:fitted]
+    validate = tuple(stretch for stretch in stretches[fitted:] if stretch.rows)
+    sticks = any(stretch.sticks is not None for stretch in identify)
+    laws = tuple(one for one in LADDER if one.pointwise or not sticks) if law is None else (law,)
+    judging = LawEquations.of(validate, arm) if validate else None
+    ladder = climb(LawEquations.of(identify, arm), judging, laws)
+    both, chosen = (*identify, *validate), ladder.chosen.fit
     if not sticks:  # reversals are kinks of the speed, and where it sticks they are left out
         both = tuple(refined(stretch, chosen, logs.resolution) for stretch in both)
-    for _ in range(_CONFIG.courses if course is not None else 1):
-        both = _along(both, course, chosen)  # the same columns in both
-        final = fit_law(LawEquations.of(both[:fitted], arm), chosen.law, [chosen.theta])
-        course, chosen = _next(course, final), final
+    both, final = _with_course(both, fitted, course, chosen, arm)
     identify, validate = both[:fitted], both[fitted:]
     if sticks:
         final = _with_dependent_errors(final, identify, sliding.attenuation)
     covered = coverage(identify)
-    judging = max(validate or identify, key=lambda stretch: len(stretch.t))
-    at_rest = [stretch for stretch in logs.stretches(logs.hold, window)
-               if any(same_posture(stretch.posture, posture) for posture in final.postures)]
-    return JointFit(
-        logs, final, choice.ladder, identify, _simulated(judging, bool(validate), final), covered,
-        unseen(covered, choice.ladder), speed_map(identify, final),
-        break_away((*identify, *at_rest), final), held_at_least(at_rest, final), window, sliding,
-        course)
+    longest = max(validate or identify, key=lambda stretch: len(stretch.t))
+    driven = _simulated(longest, bool(validate), final)
+    gaps = unseen(covered, ladder)
+    return JointFit(logs, final, ladder, identify, driven, covered, gaps, window, sliding, course)
 
 
 def _usable_rows(logs: JointLogs, window: float,
@@ -196,10 +181,8 @@ def _refined(stretches: Stretches, fitted: int, arm: OneJoint,
              resolution: float) -> tuple[Stretches, LawFit]:
     """Return the motion refined about a law that follows any curve, and that law."""
     fit = fit_law(LawEquations.of(stretches[:fitted], arm), _FLEXIBLE)
-    for _ in range(_CONFIG.rounds):
-        stretches = tuple(refined(stretch, fit, resolution) for stretch in stretches)
-        fit = fit_law(LawEquations.of(stretches[:fitted], arm), _FLEXIBLE, [fit.theta])
-    return stretches, fit
+    stretches = tuple(refined(stretch, fit, resolution) for stretch in stretches)
+    return stretches, fit_law(LawEquations.of(stretches[:fitted], arm), _FLEXIBLE, [fit.theta])
 
 
 def _followed(stretches: Stretches, fit: LawFit, slides: Mask) -> bool:
@@ -213,68 +196,20 @@ def _followed(stretches: Stretches, fit: LawFit, slides: Mask) -> bool:
             or doubt.sum() <= sure.sum())
 
 
-@dataclass(frozen=True, eq=False)
-class _Choice:
-    """A law chosen with a course of friction in time, or without."""
+def _with_course(stretches: Stretches, fitted: int, course: Course | None, fit: LawFit,
+                 arm: OneJoint) -> tuple[Stretches, LawFit]:
+    """Return the stretches with the column of `course`, and the law of `fit` fitted to them.
 
-    stretches: Stretches  # the fitted ones first; of the others those with rows
-    ladder: Ladder
-    course: Course | None
-
-
-def _choice(stretches: Stretches, fitted: int, course: Course | None, fit: LawFit, arm: OneJoint,
-            law: Law | None) -> _Choice:
-    """Choose among laws, or fit `law`, while friction changes along `course`.
-
-    The time constant is fitted first, with the flexible law `fit`.
+    What changes as a whole is the curve of the law itself, so that it is fitted in rounds.
     """
-    stretches = _along(stretches, course, fit)
-    for k in range(_CONFIG.courses if course is not None else 0):
-        fit = fit_law(LawEquations.of(stretches[:fitted], arm), fit.law, [fit.theta])
-        if k + 1 < _CONFIG.courses:
-            course = _next(course, fit)
-            stretches = _along(stretches, course, fit)
-    identify = stretches[:fitted]
-    validate = tuple(stretch for stretch in stretches[fitted:] if stretch.rows)
-    sticks = any(stretch.sticks is not None for stretch in identify)
-    laws = tuple(one for one in LADDER if one.pointwise or not sticks) if law is None else (law,)
-    ladder = climb(LawEquations.of(identify, arm),
-                   LawEquations.of(validate, arm) if validate else None, laws)
-    return _Choice((*identify, *validate), ladder, course)
-
-
-def _along(stretches: Stretches, course: Course | None, fit: LawFit) -> Stretches:
-    """Return the stretches with columns of `course`, and of friction that lags behind its speed.
-
-    f(v(t - T)) = f - T df/dt to first order (Armstrong-Hélouvry et al. 1994, Section 2.1). Of f,
-    the curve of `fit`, counts what departs from the slope at the highest speeds: viscous friction
-    does not lag, and its lag would be inertia. T < 0 where bristles straighten.
-    """
-    rows = np.abs(np.concatenate([stretch.middle[1] for stretch in stretches]))
     fastest = float(max(np.abs(stretch.dq).max() for stretch in stretches))
-    side = np.geomspace(max(float(rows.min()), 1e-3 * float(rows.max())), fastest, _CONFIG.curve)
+    side = np.geomspace(1e-3 * fastest, fastest, _CONFIG.curve)
     speed = np.concatenate([-side[::-1], side])
-    curve, k = fit.curve(speed), _CONFIG.fastest
-    ends = (curve[k] - curve[0], curve[-1] - curve[-1 - k])
-    bent = curve - np.where(speed < 0.0, *ends) / (side[-1] - side[-1 - k]) * speed
-    reach = max(np.ptp(part) for part in np.split(bent, 2))
-    lags = (reach > _CONFIG.bent * float(np.abs(curve).max())
-            and any(stretch.sticks is not None for stretch in stretches))
-    own = None if course is None else replace(course, curve=(speed, curve))
-    lag = (speed, bent) if lags else None
-    return tuple(replace(stretch, course=own, lag=lag) for stretch in stretches)
-
-
-def _next(course: Course | None, fit: LawFit) -> Course | None:
-    """Return the course with the time constant of a fit, one step of Gauss and Newton on."""
-    if course is None or course.kind == "step":
-        return course
-    if course.change == 0.0:
-        return replace(course, change=float(fit.rigid[0, -1]))
-    change, step = fit.rigid[0, -2:]
-    time = float(np.clip(course.time * np.exp(np.clip(step, -0.5, 0.5)), 0.05 * course.until,
-                         10.0 * course.until))
-    return replace(course, change=float(change), time=time)
+    for _ in range(_CONFIG.courses if course is not None else 1):
+        own = None if course is None else replace(course, curve=(speed, fit.curve(speed)))
+        stretches = tuple(replace(stretch, course=own) for stretch in stretches)
+        fit = fit_law(LawEquations.of(stretches[:fitted], arm), fit.law, [fit.theta])
+    return stretches, fit
 
 
 def _with_dependent_errors(fit: LawFit, stretches: Stretches, attenuation: float) -> LawFit:
@@ -288,19 +223,6 @@ def _with_dependent_errors(fit: LawFit, stretches: Stretches, attenuation: float
     places = fit.rigid_size * np.arange(len(fit.postures))
     covariance[places, places] += np.square(min(attenuation, 1.0) * found.beta[places])
     return replace(fit, found=replace(found, covariance=covariance))
-
-
-def by_method(joint: JointFit, method: str) -> JointFit:
-    """Return `joint`, which was fitted by variable projection, with the numbers of `method`.
-
-    Raises:
-        UsageError: C02, a prismatic joint for the filter.
-    """
-    if method == "varpro":
-        return joint
-    fit = filtered(joint.stretches, joint.fit.joint, joint.logs.resolution)
-    driven = _simulated(joint.driven.stretch, joint.driven.judging, fit)
-    return replace(joint, fit=fit, driven=driven, map=speed_map(joint.stretches, fit))
 
 
 def fractions(joint: JointFit) -> tuple[Array, Array, Array]:

@@ -10,7 +10,6 @@ from pipelines.dynamics.arm import Arm
 from pipelines.errors import Check
 from pipelines.estimation.estimate import Fitted
 from pipelines.estimation.motion import Motions
-from pipelines.friction.breakaway import Event
 from pipelines.friction.config import DriftConfig
 from pipelines.friction.fit import LawFit, Value
 from pipelines.friction.joint import JointFit, fractions
@@ -74,7 +73,6 @@ class Drift:
     speed: float  # [rad/s] at which
     holds_at: float  # [s] since the start of a log, when friction is the law; of a step, before it
     log: str
-    when_std: float | None = None  # [s] of a time constant; null of a step or a straight trend
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,6 @@ class Sticking:
     seconds: float  # [s]
     distance: float  # [rad] of travel after a rest or reversal from which it slides
     window: float  # [s] of the equations
-    slips: int  # times that it stuck amid motion one way
 
 
 @dataclass(frozen=True)
@@ -95,10 +92,6 @@ class Series:
     speed: Array  # [rad/s] (points,) of the curve
     curve: Array  # [N m]
     band: Array  # [N m] one standard deviation
-    map_speed: Array  # [rad/s] (classes,)
-    map_odd: Array  # [N m]
-    map_std: Array
-    map_even: Array
     t: Array  # [s] (samples,) of the judged log, thinned out
     torque: Array  # [N m]
     friction: Array  # simulated
@@ -119,7 +112,6 @@ class JointResult:
     joint: int
     name: str
     law: str
-    method: str
     parameters: dict[str, Value]
     inertia: Value
     gravity: dict[str, Value]  # c of sin q, c' of cos q; a prismatic joint's weight
@@ -128,8 +120,6 @@ class JointResult:
     candidate_laws: tuple[CandidateLaw, ...]
     judged_by: str  # "logs" | "blocks"
     unseen: tuple[Missing, ...]
-    break_away: tuple[Event, ...]
-    held: tuple[float, float] | None  # [N m] carried at rest
     driven: tuple[float, float]  # [rad/s] slowest and fastest
     logs: tuple[str, ...]
     series: Series
@@ -155,7 +145,7 @@ class Result:
     derived: tuple[tuple[str, ExperimentLog], ...] = field(metadata=NOT_STORED, repr=False)
 
 
-def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
+def joint_result(joint: JointFit, name: str) -> JointResult:
     """Return what is kept of the fit of a joint that was driven alone."""
     fit, ladder, driven = joint.fit, joint.ladder, joint.driven
     several, errors = len(fit.law.members) > 1, []
@@ -166,17 +156,13 @@ def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
     for simulated in (driven.with_friction, driven.without):
         error = driven.error(simulated)
         errors.append(error if np.isfinite(error) else None)
-    drift, open_ = _drift(joint), joint.unseen
-    named = joint.course is not None and joint.course.named
-    if drift is not None and not (named and _shown(drift)):
-        open_ = (*open_, _not_excluded(drift))
-        drift = None
+    drift = _drift(joint)
     return JointResult(
-        joint.logs.joint, name, fit.law.name, method, parameters, postures[0].inertia,
+        joint.logs.joint, name, fit.law.name, parameters, postures[0].inertia,
         postures[0].gravity, postures,
         Validation(errors[0], errors[1], driven.stretch.name, driven.judging,
                    _torque_error(ladder)),
-        _candidates(ladder), ladder.by, open_, joint.break_away, joint.held,
+        _candidates(ladder), ladder.by, joint.unseen,
         (joint.covered.slowest, joint.covered.fastest),
         tuple(log.name for log, _ in (*joint.logs.identify, *joint.logs.validate)),
         _series(joint), True, drift, _sticking(joint))
@@ -194,54 +180,29 @@ def _posture(joint: JointFit, k: int) -> Posture:
 
 def _drift(joint: JointFit) -> Drift | None:
     """Return the change of friction at half of the fastest speed, relative to the law."""
-    fit, course = joint.fit, joint.course
+    fit, course = joint.fit, joint.stretches[0].course
     if course is None:
         return None
     speed = 0.5 * joint.covered.fastest
-    both = np.array([speed, -speed])
-    own = joint.stretches[0].course or course
-    share = float(np.mean(np.abs(own.shape(both)))) / float(np.mean(np.abs(fit.curve(both))))
-    last, when_std = fit.rigid_size - 1, None
-    if own.change != 0.0:  # the last column is that of the time constant
-        when_std, last = course.time * float(fit.std[last]), last - 1
-    change = Value(share * float(fit.found.beta[last]), abs(share) * float(fit.std[last]), "1")
-    return Drift(course.kind, course.form, course.time, change, speed, course.holds,
-                 joint.stretches[course.part].name, when_std)
-
-
-def _shown(drift: Drift) -> bool:
-    """Return whether the law that was chosen shows the change that rows showed without a law."""
-    change = drift.change
-    return change.std is None or abs(change.value) > DriftConfig().sure * change.std
-
-
-def _not_excluded(drift: Drift) -> Missing:
-    """Return what the logs neither show nor exclude: a change of friction that is in the fit."""
-    size, std = 100.0 * drift.change.value, 100.0 * (drift.change.std or 0.0)
-    return Missing(f"whether friction changes in the course of a log (by {size:.2g} ± {std:.2g} % "
-                   "if the law is right) or with speed alone: these logs do not tell",
-                   "drive every speed early and late in the log")
+    both, last = np.array([speed, -speed]), fit.rigid_size - 1
+    share = float(np.mean(np.abs(course.shape(both)))) / float(np.mean(np.abs(fit.curve(both))))
+    change, std = share * float(fit.found.beta[last]), abs(share) * float(fit.std[last])
+    if abs(change) <= DriftConfig().sure * std:  # the law that was chosen does not show it
+        return None
+    name = joint.stretches[course.part].name
+    size = Value(change, std, "1")
+    return Drift(course.kind, course.form, course.time, size, speed, course.holds, name)
 
 
 def _sticking(joint: JointFit) -> Sticking | None:
-    """Return how much of the logs was left out, for the joint stuck or bent its contacts.
-
-    It stuck amid motion one way where it slides, rests and slides on in the same direction.
-    """
-    left, kept, slips, seconds = 0, 0, 0, 0.0
-    for stretch in joint.stretches:
-        kept += stretch.rows
-        if stretch.sticks is None:
-            continue
-        count = int(stretch.sticks.sum())
-        left, seconds = left + count, seconds + count * float(stretch.length.mean())
-        speed = np.add.reduceat(stretch.dq, stretch.edges[:-1]) * (stretch.sticks == 0)
-        side = np.sign(speed)
-        moving = np.flatnonzero(side)
-        slips += int(((np.diff(moving) > 1) & (side[moving[1:]] == side[moving[:-1]])).sum())
-    if not left:
+    """Return how much of the logs was left out, for the joint stuck or bent its contacts."""
+    sticking = [stretch for stretch in joint.stretches if stretch.sticks is not None]
+    left = [int(stretch.sticks.sum()) for stretch in sticking if stretch.sticks is not None]
+    if not sum(left):
         return None
-    return Sticking(left / (left + kept), seconds, joint.sliding.distance, joint.window, slips)
+    seconds = sum(n * float(one.length.mean()) for n, one in zip(left, sticking, strict=True))
+    share = sum(left) / (sum(left) + sum(stretch.rows for stretch in joint.stretches))
+    return Sticking(share, seconds, joint.sliding.distance, joint.window)
 
 
 def _candidates(ladder: Ladder) -> tuple[CandidateLaw, ...]:
@@ -267,7 +228,7 @@ def _series(joint: JointFit) -> Series:
     samples = (stretch.t - stretch.t[0], stretch.tau, *fractions(joint), stretch.q, stretch.dq,
                driven.with_friction.q, driven.with_friction.dq, driven.without.q,
                driven.without.dq)
-    return Series(*_curve(joint.fit, joint.covered.fastest), *joint.map,
+    return Series(*_curve(joint.fit, joint.covered.fastest),
                   *(np.asarray(x[::every]) for x in samples))
 
 
@@ -304,11 +265,11 @@ def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array,
     if moves:
         missing = undecided(ladder, slowest, fastest)
     return JointResult(
-        j + 1, arm.robot.joints[j].name, law.name, "varpro", numbers, inertia, {},
+        j + 1, arm.robot.joints[j].name, law.name, numbers, inertia, {},
         (Posture(tuple(map(float, middle)), inertia, {}),),
         Validation(None, None, "", False, _torque_error(ladder)), _candidates(ladder), ladder.by,
-        missing, (), None, (slowest, fastest), names,
-        Series(*_curve(fit, fastest), *(np.zeros(0),) * 15), moves)
+        missing, (slowest, fastest), names,
+        Series(*_curve(fit, fastest), *(np.zeros(0),) * 11), moves)
 
 
 def _inertia(fitted: Fitted, arm: Arm, j: int, q: Array) -> Value:

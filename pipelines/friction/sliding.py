@@ -23,7 +23,7 @@ draws of their signs (estimation/bootstrap.py).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -240,13 +240,11 @@ class _Drift:
 
 
 def drift_of(stretches: Sequence[Stretch], joint: OneJoint) -> Course | None:
-    """Return the course of friction in time that rows show, or a trend not excluded.
+    """Return the course of friction in time that rows show, or None.
 
-    Of those shown the first that is not measurably worse than the best: all friction by one share
-    comes before a part of it, and a trend before a step. Logs that visit every speed once, one
-    after the other, show a drift as a part of the friction curve: where rows show none, a trend of
-    all friction that they do not exclude, not named; None where they do. A course that costs a
-    number and gains nothing loses in blocks held out. A step may lie between any two rows.
+    Of several the first that is not measurably worse than the best: all friction by one share
+    comes before a part of it, and a trend before a step. A course that costs a number and gains
+    nothing loses in blocks held out. A step may lie between any two rows.
 
     Args:
         stretches: they slide.
@@ -269,9 +267,7 @@ def drift_of(stretches: Sequence[Stretch], joint: OneJoint) -> Course | None:
     if best.size >= least and by_flips(gains) <= _DRIFT.chance:
         return next(drift.course for drift in drifts
                     if no_worse(drift.fit.residual, best.fit.residual))
-    trend = drifts[0]
-    most = trend.size + _DRIFT.sure * _deviation(trend, rows)
-    return replace(trend.course, named=False) if most > least else None
+    return None
 
 
 def _best(kind: str, form: str, rows: _Rows) -> _Drift:
@@ -288,13 +284,6 @@ def _best(kind: str, form: str, rows: _Rows) -> _Drift:
         own = rows.along(course) * shape
         fit = _fitted(np.column_stack([rows.steady.columns, own]), rows.y)
     return _Drift(course, fit, float(np.median(np.abs(shape))))
-
-
-def _deviation(drift: _Drift, rows: _Rows) -> float:
-    """Return the std of the size of a drift [N m], errors in a block dependent (White 1984)."""
-    outside = rows.steady.beside(drift.fit.columns[:, -1])
-    sums = np.bincount(rows.blocks, outside * drift.fit.residual)
-    return drift.typical * float(np.linalg.norm(sums)) / max(float(outside @ outside), 1e-300)
 
 
 def _trend(form: str, shape: Array, rows: _Rows) -> Course:

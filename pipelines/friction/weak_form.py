@@ -38,7 +38,6 @@ __all__ = ["Course", "Mask", "Stretch", "Sway", "Windows", "blocks_of_time", "mo
 
 Mask = npt.NDArray[np.bool_]
 
-PART = 1e-3  # numerics: of a finite difference, relative
 KINKED = 2  # numerics: order of a smoother for motion whose acceleration jumps
 GAUSS = 0.5 / 3.0**0.5  # numerics: of their time, from its middle: where two nodes lie
 
@@ -102,20 +101,17 @@ class Course:
     until: float  # [s] duration of a trend's log; of a step when
     part: int = 0  # stretch of a step
     curve: tuple[Array, Array] | None = None  # speeds [rad/s] and torques [N m] of friction
-    change: float = 0.0  # α of a trend in the fit before: α ∂c/∂(ln T) g is a column, T fitted
-    named: bool = True  # shown by the rows; else neither shown nor excluded
 
     def at(self, part: int, since: Array) -> Array:
-        """Return c(t) in one of the stretches, `since` its start [s]: it rises by one."""
+        """Return c(t) in one of the stretches, `since` its start [s]: it rises by one.
+
+        Of a trend (exp(-h/T) - exp(-t/T)) / (1 - exp(-D/T)).
+        """
         if self.kind == "trend":
-            return self._risen(since, self.time)
+            rise = np.exp(-self.holds / self.time) - np.exp(-since / self.time)
+            return np.asarray(rise / -np.expm1(-self.until / self.time))
         after = since >= self.time if part == self.part else np.full(len(since), part > self.part)
         return after.astype(np.float64)
-
-    def _risen(self, since: Array, time: float) -> Array:
-        """Return (exp(-h/T) - exp(-t/T)) / (1 - exp(-D/T))."""
-        rise = np.exp(-self.holds / time) - np.exp(-since / time)
-        return np.asarray(rise / -np.expm1(-self.until / time))
 
     def shape(self, v: Array) -> Array:
         """Return g(v) [N m], [rad/s] or 1."""
@@ -125,18 +121,10 @@ class Course:
             return np.sign(v)
         return np.interp(v, *self.curve)
 
-    def columns(self, part: int, t: Array, dq: Array) -> Array:
-        """Return c(t) g(v), and α ∂c/∂(ln T) g, over the step after each sample.
-
-        (samples, 1 or 2); the last row is zero.
-        """
-        since = 0.5 * (t[1:] + t[:-1]) - t[0]
-        courses = [self.at(part, since)]
-        if self.change != 0.0:
-            ends = [self._risen(since, self.time * (1.0 + side * PART)) for side in (1.0, -1.0)]
-            courses.append(self.change * (ends[0] - ends[1]) / (2.0 * PART))
-        value = np.stack(courses, axis=1) * self.shape(0.5 * (dq[1:] + dq[:-1]))[:, None]
-        return np.vstack([value, np.zeros((1, len(courses)))])
+    def column(self, part: int, t: Array, dq: Array) -> Array:
+        """Return c(t) g(v) over the step after each sample (samples, 1); the last is zero."""
+        value = self.at(part, 0.5 * (t[1:] + t[:-1]) - t[0]) * self.shape(0.5 * (dq[1:] + dq[:-1]))
+        return np.append(value, 0.0)[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +173,6 @@ class Stretch:
     weighs: bool = True  # gravity acts about the joint's axis
     sticks: Mask | None = None  # (windows,) the joint does not slide: no row of a sliding law
     course: Course | None = None  # of friction that changes in time
-    lag: tuple[Array, Array] | None = None  # speeds [rad/s], torques [N m] of friction that lags
     untimed: bool = False  # the torque is measured: when in its step it acted is not known
     part: int = 0  # number of the stretch
 
@@ -282,16 +269,13 @@ class Stretch:
         """Return more columns over the step after each sample (samples, columns).
 
         Of a torque sample that may act a part of a step later or earlier, its change over the step;
-        of joints that are held and sway; of friction that lags; and of friction that changes.
+        of joints that are held and sway; and of friction that changes.
         """
         parts = [sway_columns(self.t, self.q, self.dq, self.sways, self.revolute)]
         if self.untimed:
             parts.insert(0, np.append(np.diff(self.known_tau), 0.0)[:, None])
-        if self.lag is not None:
-            level = np.interp(self.dq, *self.lag)
-            parts.append(np.append(np.diff(level) / np.diff(self.t), 0.0)[:, None])
         if self.course is not None:
-            parts.append(self.course.columns(self.part, self.t, self.dq))
+            parts.append(self.course.column(self.part, self.t, self.dq))
         return np.hstack(parts)
 
     @cached_property

@@ -10,7 +10,7 @@ import numpy as np
 
 from pipelines.effects import find_effect
 from pipelines.estimation.nominal import plain_number
-from pipelines.friction.config import BreakAwayConfig, FindingsConfig
+from pipelines.friction.config import FindingsConfig
 from pipelines.friction.findings import drift_in_words
 from pipelines.friction.fit import Value
 from pipelines.friction.laws import law_named
@@ -177,9 +177,7 @@ def _summary(result: Result) -> Section:
 def _joint_sections(joint: JointResult) -> list[Section]:
     name, speed = joint.name, _units(joint)[1]
     drift = drift_in_words(joint)
-    how = BreakAwayConfig()
-    never = _never_broke_away(joint)
-    text = _paragraphs("joint", joint, speed, drift, _sticking(joint), never, how.rest, how.within)
+    text = _paragraphs("joint", joint, speed, drift, _sticking(joint))
     sections = [Section(f"{name}: friction", text, _tables(joint), (_curve_figure(joint),))]
     if joint.validation.by:
         figures = (_simulation_figure(joint), _fraction_figure(joint))
@@ -197,20 +195,8 @@ def _sticking(joint: JointResult) -> dict[str, str] | None:
     return {"share": plain_number(100.0 * joint.sticking.share), "travel": travel}
 
 
-def _never_broke_away(joint: JointResult) -> list[str]:
-    seen = {event.direction for event in joint.break_away}
-    return [words for side, words in ((1, "forth"), (-1, "back")) if side not in seen]
-
-
 def _tables(joint: JointResult) -> tuple[Table, ...]:
     tables = []
-    if joint.break_away:
-        rows = tuple(
-            ("forth" if e.direction > 0 else "back", _std(e.torque), e.torque.unit, e.events)
-            for e in joint.break_away
-        )
-        caption = "Mean ± std of one event; reported, not part of the law."
-        tables.append(Table(("direction", "break-away torque", "unit", "events"), rows, caption))
     if joint.unseen:
         gaps = tuple((gap.what, gap.record) for gap in joint.unseen)
         columns = ("not shown by these logs", "what to record")
@@ -255,8 +241,8 @@ def _curve_figure(joint: JointResult) -> Figure:
     series, (_, speed, torque) = joint.series, _units(joint)
     width, height = 2.0 * float(np.max(series.band)), float(np.max(np.abs(series.curve)))
     known = bool(np.isfinite(width)) and height > 0.0
-    thin, paired = width < _THIN * height, len(series.map_speed) > 0
-    caption = _say("curve", joint.name, width if known else None, torque, thin, paired)
+    thin = width < _THIN * height
+    caption = _say("curve", joint.name, width if known else None, torque, thin)
 
     def draw(drawing: Drawing) -> None:
         whole, near = drawing.subplots(1, 2, sharey=True, width_ratios=(3, 2))
@@ -272,19 +258,12 @@ def _curve_figure(joint: JointResult) -> Figure:
 
 
 def draw_curve(axis: Axes, series: Series, reach: float) -> None:
-    """The law with its band, and the torques at equal position and opposite speed."""
+    """The law with its band."""
     inside = np.abs(series.speed) <= 1.05 * reach
     v, curve, band = series.speed[inside], series.curve[inside], 2.0 * series.band[inside]
     shade: Look = {"color": style.BLUE, "alpha": 0.25, "linewidth": 0.0}
     axis.fill_between(v, curve - band, curve + band, label="± 2 std", **shade)
     axis.plot(v, curve, color=style.BLUE, linewidth=1.2, label="fitted law")
-    near = series.map_speed <= 1.05 * reach
-    points = (series.map_speed[near], series.map_odd[near])
-    look: Look = {"markersize": 3.0, "color": style.VERMILLION, "elinewidth": 0.8}
-    for side in (1.0, -1.0) if len(series.map_speed) else ():
-        label = "± v in pairs" if side > 0 else None
-        v, x = (side * p for p in points)
-        axis.errorbar(v, x, 2.0 * series.map_std[near], fmt="o", label=label, **look)
     axis.axhline(0.0, color=style.GREY, linewidth=0.6)
     axis.axvline(0.0, color=style.GREY, linewidth=0.6)
     axis.set_xlim(-1.03 * reach, 1.03 * reach)

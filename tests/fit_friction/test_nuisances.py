@@ -203,25 +203,3 @@ def test_a_log_after_the_step_judges_the_law_with_the_step() -> None:
     assert joint.judged_by == "logs"
     assert joint.validation.torque_error is not None
     assert joint.validation.torque_error < 0.05
-
-
-@pytest.mark.slow
-def test_a_drift_that_looks_like_a_law_is_no_part_of_the_curve() -> None:
-    """Speeds rise while friction falls by a sixth: the curve holds, and the doubt is reported."""
-    machine = draw("trend", 7011)
-    log = logs_of([machine])["trend-7011"]
-    (joint,) = fit_friction.compute(Inputs((Opened(Path("a.h5"), "", log, ()),), label="logs"), Settings()).joints
-    speed = joint.driven[1] * np.array([-0.9, -0.5, -0.25, 0.25, 0.5, 0.9])
-    truth = machine.friction(speed) * machine.scale(np.array([machine.seconds / 2]))
-    curve = np.interp(speed, joint.series.speed, joint.series.curve)
-    assert np.abs(curve / truth - 1.0).max() < 0.01
-    assert joint.drift is not None or any("in the course of a log" in gap.what for gap in joint.unseen)
-
-
-@pytest.mark.slow
-def test_a_joint_that_creeps_in_its_bristles_at_last_does_not_drift() -> None:
-    """Stick-slip at the slowest speeds, driven last: a step that the law itself leaves at 12 ± 13 % is not named."""
-    log = logs_of([draw("stick-slip", 7027)])["stick-slip-7027"]
-    (joint,) = fit_friction.compute(Inputs((Opened(Path("a.h5"), "", log, ()),), label="logs"), Settings()).joints
-    assert joint.drift is None
-    assert any("in the course of a log" in gap.what for gap in joint.unseen)

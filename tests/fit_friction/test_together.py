@@ -68,10 +68,3 @@ def test_half_of_the_torque_left_is_no_good_fit(outrunner: Result) -> None:
     for error, tone in ((0.05, "good"), (0.3, "attention"), (None, "attention")):
         judged = replace(joint, validation=replace(joint.validation, torque_error=error))
         assert fit_friction.report(replace(outrunner, joints=(judged,), checks=())).tone == tone
-
-
-def test_a_curve_without_points_claims_none(outrunner: Result) -> None:
-    """Joints that all move have no pairs of torques."""
-    assert not len(outrunner.joints[0].series.map_speed)
-    captions = [figure.caption for section in fit_friction.report(outrunner).sections for figure in section.figures]
-    assert any("no torques at equal position and opposite speed" in caption for caption in captions)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from pipelines.estimation.motion import Reconstruction, reconstruct
-from pipelines.friction.ekf import filtered
 from pipelines.friction.fit import LawEquations, LawFit, fit_law
 from pipelines.friction.laws import OneJoint, law_named
 from pipelines.friction.refine import refined
@@ -76,12 +75,3 @@ def test_the_band_is_honest(fits: dict[int, LawFit]) -> None:
         speed = driven_speeds(recorded("three_sigmoid", seed))
         scores.append((fit.curve(speed) - TRUTHS["three_sigmoid"].curve(speed)) / fit.curve_std(speed))
     assert 0.6 < np.sqrt(np.mean(np.square(scores))) < 1.6
-
-
-@pytest.mark.slow
-def test_the_curve_is_better_than_the_papers_filter(fits: dict[int, LawFit]) -> None:
-    """Median error below that of the extended Kalman filter on the same logs."""
-    joint = OneJoint.of(recorded("three_sigmoid", 0).robot, JOINT)
-    theirs = [curve_error(seed, filtered(stretches("three_sigmoid", seed), joint, ENCODER)) for seed in SEEDS]
-    assert np.median([curve_error(seed, fits[seed]) for seed in SEEDS]) < np.median(theirs)
-    assert np.median(theirs) < 0.05, "the filter itself works"

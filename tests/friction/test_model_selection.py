@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from pipelines.estimation.motion import Reconstruction, reconstruct
+from pipelines.friction.coverage import coverage, unseen
 from pipelines.friction.fit import LawEquations
 from pipelines.friction.joint import JointFit, JointLogs, fit_joint
 from pipelines.friction.laws import OneJoint
 from pipelines.friction.model_selection import climb
-from pipelines.friction.speed_map import coverage, unseen
 from pipelines.friction.weak_form import Stretch
 from tests.friction.one_joint import JOINT, STEP, TRUTHS, driven_speeds, recorded, relative
 

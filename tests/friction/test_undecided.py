@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from pipelines.estimation.nominal import plain_number
+from pipelines.friction.coverage import coverage
 from pipelines.friction.fit import LawEquations
 from pipelines.friction.laws import OneJoint
 from pipelines.friction.model_selection import climb, undecided
-from pipelines.friction.speed_map import coverage
 from tests.friction.one_joint import JOINT, recorded
 from tests.friction.test_model_selection import plateaus
 
