@@ -26,7 +26,7 @@ from pipelines.simulation.plant import Plant, refuse_runaway
 
 __all__ = ["Noise", "Simulated", "run", "run_together", "runs_alone"]
 
-_CHUNK = 2048  # numerics: samples whose noise is drawn at once
+_CHUNK = 2048  # numerics: samples whose noise is drawn, or that are Python numbers, at once
 _LOOKS = 64  # numerics: samples between two looks at whether an arm runs away
 
 
@@ -167,24 +167,31 @@ def _run_alone(arm: OneArm, lane: _Lane, replica: int) -> None:
     laws = [Feedback(experiment, joint) for joint in range(experiment.n_joints)]
     draws = _draws(lane.noise, (lane.seeds[replica],), experiment.n_samples)
     x: list[float] = [*lane.state[:, replica].tolist(), *lane.states[replica].tolist()]
-    rows = zip(experiment.q_ref, ahead_of(experiment), draws, strict=True)
-    for k, (reference, ahead, (torque, position)) in enumerate(rows):
+    wanted, more = _listed(experiment.q_ref), _listed(ahead_of(experiment))
+    noise = _listed(np.array([np.concatenate(drawn)[:, 0] for drawn in draws]))
+    for k, (reference, ahead, drawn) in enumerate(zip(wanted, more, noise, strict=True)):
         lane.motion[k, :, replica] = x[:6]
-        seen, said = [], []
+        seen, said, applied = [], [], []
         try:
-            angles = (x[:3] + position[:, 0]).tolist()
-            each = zip(laws, angles, reference.tolist(), ahead.tolist(), strict=True)
-            for law, angle, wanted, more in each:
+            for j, law in enumerate(laws):
+                angle = x[j] + drawn[3 + j]
                 q = angle if law.counts is None else law.counts(angle)
                 seen.append(q)
-                said.append(law.delayed(law.limited(law(q - wanted, more))))
+                said.append(law.delayed(law.limited(law(q - reference[j], ahead[j]))))
+                applied.append(said[j] + drawn[j])
         except (ValueError, OverflowError):  # of an infinite number there is no count
             x = [nan] * len(x)
         if k % _LOOKS == 0 or x[0] != x[0]:
             refuse_runaway(np.array(x[:6])[:, None], k, time)
         lane.counted[k, :, replica], lane.commanded[k, :, replica] = seen, said
-        x = arm.moved(x, (said + torque[:, 0]).tolist())
+        x = arm.moved(x, applied)
     refuse_runaway(np.array(x[:6])[:, None], experiment.n_samples, time)
+
+
+def _listed(x: Array) -> Iterator[list[float]]:
+    """Yield the rows of `x` as lists; all at once would take ten times the room."""
+    for first in range(0, len(x), _CHUNK):
+        yield from x[first : first + _CHUNK].tolist()
 
 
 def _draws(noise: Noise, seeds: tuple[int, ...], samples: int) -> Iterator[tuple[Array, Array]]:

@@ -205,14 +205,15 @@ def _in_numbers(hook: Hooks) -> bool:
 
 
 def _curve(form: SpeedCurve) -> Callable[[float], float]:
-    """τ(v) = constant + viscous v + Σ height tanh(sharpness v)."""
+    """τ(v) = constant + viscous v + Σ height tanh(sharpness v), most often of one or three."""
     constant, viscous = form.constant, form.viscous
     pairs = list(zip(form.heights, form.sharpnesses, strict=True))
-
-    def curve(v: float) -> float:
-        torque = constant + viscous * v
-        for height, w in pairs:
-            torque += height * tanh(w * v)
-        return torque
-
-    return curve
+    if len(pairs) == 1:
+        ((f, w),) = pairs
+        return lambda v: constant + viscous * v + f * tanh(w * v)
+    if len(pairs) == 3:  # noqa: PLR2004
+        (f1, w1), (f2, w2), (f3, w3) = pairs
+        return lambda v: (
+            constant + viscous * v + f1 * tanh(w1 * v) + f2 * tanh(w2 * v) + f3 * tanh(w3 * v)
+        )
+    return lambda v: form.of(v, NUMBERS)
