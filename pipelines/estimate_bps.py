@@ -14,15 +14,9 @@ from pathlib import Path
 
 from pipelines.dynamics.arm import Arm, ArmTorque
 from pipelines.dynamics.parameter import Uncertainty
-from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
+from pipelines.errors import Check, NothingMatched, UsageError
 from pipelines.estimation.balance import power_balance
-from pipelines.estimation.checks.boundary import (
-    Boundary,
-    boundary_findings,
-    torque_boundary,
-    without_followers,
-)
-from pipelines.estimation.checks.plausibility import mismatches
+from pipelines.estimation.checks.gates import examined
 from pipelines.estimation.consistency import consistency
 from pipelines.estimation.estimate import (
     Fitted,
@@ -30,6 +24,8 @@ from pipelines.estimation.estimate import (
     Recipe,
     fit_logs,
     judge,
+    motions_of,
+    refuse_leak,
     refuse_strange,
     refuse_unfit,
     with_cutoff,
@@ -37,7 +33,7 @@ from pipelines.estimation.estimate import (
 from pipelines.estimation.identifiability import not_separated
 from pipelines.estimation.judgements import REMEDY, negative_viscous
 from pipelines.estimation.mean_period import averaged, doubts, residuals
-from pipelines.estimation.motion import Motions, Reconstructed, for_equations, reconstruct
+from pipelines.estimation.motion import Motions, Reconstructed, for_equations
 from pipelines.estimation.nominal import columns_in_words, fitted_arm, nominal_columns
 from pipelines.estimation.observers import Reconstruction
 from pipelines.estimation.regression import Rows
@@ -56,7 +52,6 @@ from pipelines.io.model_file import (
 from pipelines.io.option import option
 from pipelines.io.results import encode
 from pipelines.io.schema import joint_unit
-from pipelines.quality.checks import Subject, accepted
 from pipelines.report.bps_report import bps_report
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, Uses, read_logs, slug
@@ -136,10 +131,10 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     for log in (*identify, *validate):
         settings.reconstruction.check(log.n_joints)
         refuse_unfit(settings, log)
-    subjects, judging = _accepted(identify), _accepted(validate)
-    boundary, said_of_torque = _boundary(identify, settings)
-    motions, said = _examined(identify, subjects, settings, said_of_torque)
-    judges, said_too = _examined(validate, judging, settings, said_of_torque)
+    logs = (*identify, *validate)
+    said, boundary = examined(logs, settings.skip_sanity_checks, gates=True)
+    motions = motions_of(identify, settings.reconstruction)
+    judges = motions_of(validate, settings.reconstruction)
     even = for_equations((*motions, *judges))
     recipe = with_cutoff(recipe, even[: len(motions)])
     means, scatter = averaged(even, recipe.cutoff_hz)
@@ -150,18 +145,16 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     arm = fitted_arm(
         fitted.estimate, identify[0].robot_name, () if given is None else given.friction
     )
-    logs = (*identify, *validate)
     said_of_periods = [
         check
         for own, log in zip(scatter, logs, strict=True)
         if own is not None
         for check in doubts(own[0], log.source or log.name)
     ]
-    said += negative_viscous(fitted.estimate, arm.name)
     return replace(
         _result(fitted, judged, (*motions, *judges), arm, settings),
         boundary=boundary,
-        data_quality=(*said_of_torque, *said, *said_too, *said_of_periods),
+        data_quality=(*said, *negative_viscous(fitted.estimate, arm.name), *said_of_periods),
         noise_floor=residuals(scatter, fitted, judged, logs),
         rigid_body_alone=_rigid_body_alone(fitted, means, rows, settings),
     )
@@ -183,53 +176,6 @@ def _rigid_body_alone(
     alone = fit_logs(means[:identify], columns, recipe, settings.weighted, rows[:identify])
     judged = judge(alone, means[identify:], settings.blocks, rows[identify:])
     return tuple(map(float, judged.errors.rms))
-
-
-def _accepted(logs: list[ExperimentLog]) -> list[tuple[Subject, list[Check]]]:
-    """Return what `inspect` says of every log; of D09 the estimate itself knows.
-
-    Raises:
-        InputRejected: the first reason to reject one.
-    """
-    subjects = []
-    for log in logs:
-        subject = Subject(recording(log))
-        subjects.append((subject, accepted(subject)))
-    return subjects
-
-
-def _boundary(
-    logs: list[ExperimentLog], settings: Settings
-) -> tuple[Boundary | None, tuple[Check, ...]]:
-    """Return what the torque of the logs is, and its findings where a mismatch is allowed."""
-    boundary = torque_boundary([recording(log) for log in logs])
-    findings = boundary_findings(boundary, logs[0].source or logs[0].name)
-    if findings and not settings.skip_sanity_checks:
-        raise _with_way_out(findings[0]).as_error()
-    return boundary, findings
-
-
-def _with_way_out(gate: Check) -> Check:
-    return replace(gate, remedy=f"{gate.remedy}; if it is right as it is, say --skip-sanity-checks")
-
-
-def _examined(
-    logs: list[ExperimentLog],
-    subjects: list[tuple[Subject, list[Check]]],
-    settings: Settings,
-    findings: tuple[Check, ...],
-) -> tuple[Motions, tuple[Check, ...]]:
-    """Return the motion of every log, and its checks."""
-    motions, said = [], []
-    for log, (subject, checks) in zip(logs, subjects, strict=True):
-        against = without_followers(mismatches(subject), findings)
-        if not settings.skip_sanity_checks and (
-            gate := next((check for check in against if check.gate), None)
-        ):
-            raise _with_way_out(gate).as_error()
-        motions.append((log, reconstruct(log, settings.reconstruction, subject.good)))
-        said += [*checks, *against]
-    return tuple(motions), tuple(said)
 
 
 def _friction_of(model: Arm | None, log: ExperimentLog) -> Arm | None:
@@ -310,19 +256,8 @@ def _chosen(inputs: Inputs, allow_overlap: bool) -> tuple[list[ExperimentLog], l
         )
     validate = [log for log in logs if log.role == "validate"]
     if not allow_overlap:
-        _refuse_leak(identify, validate)
+        refuse_leak(identify, validate, ", or say --allow-overlap")
     return identify, validate
-
-
-def _refuse_leak(identify: list[ExperimentLog], validate: list[ExperimentLog]) -> None:
-    """D14: what a fit was made from must not judge it."""
-    seen = {log.q.tobytes() + log.tau.tobytes(): log for log in identify}
-    for log in validate:
-        if (same := seen.get(log.q.tobytes() + log.tau.tobytes())) is not None:
-            words = f"leak: {same.name} and {log.name} hold the same samples "
-            words += "with roles identify and validate"
-            remedy = "judge on another recording, or say --allow-overlap"
-            raise InputRejected("D14", words, log.source or log.name, remedy)
 
 
 def _derived(

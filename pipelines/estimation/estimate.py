@@ -234,6 +234,22 @@ def refuse_unfit(given: EquationSettings, log: ExperimentLog) -> None:
         raise UsageError("C02", words, "--cutoff-hz", remedy)
 
 
+def refuse_leak(
+    fitted: Sequence[ExperimentLog], judging: Sequence[ExperimentLog], way_out: str = ""
+) -> None:
+    """D14: what a model was fitted to must not judge it."""
+    seen = {log.q.tobytes() + log.tau.tobytes(): log for log in fitted}
+    for log in judging:
+        if (same := seen.get(log.q.tobytes() + log.tau.tobytes())) is not None:
+            roles = f"{same.role} and {log.role}"
+            raise InputRejected(
+                "D14",
+                f"leak: {same.name} and {log.name} hold the same samples with roles {roles}",
+                where=log.source or log.name,
+                remedy=f"judge on another recording{way_out}",
+            )
+
+
 def motions_of(logs: Sequence[ExperimentLog], how: Reconstruction) -> Motions:
     """Return each log with its motion.
 

@@ -24,13 +24,14 @@ import numpy as np
 
 from pipelines.dynamics.arm import Arm
 from pipelines.effects.base import FrictionLaw
-from pipelines.errors import InputRejected
+from pipelines.errors import InputRejected, NothingMatched
 from pipelines.estimation.config import EstimateConfig, PreparationConfig, RestConfig
 from pipelines.estimation.estimate import (
     Recipe,
     equations_of,
     motions_of,
     none_left,
+    refuse_leak,
     refuse_too_few,
     with_cutoff,
 )
@@ -87,6 +88,28 @@ class Logs:
         before = tuple(log for log in frf if log.role == "reference")
         after = tuple(log for log in frf if log.role != "reference")
         return cls(parts[0], parts[1], parts[2], after, before)
+
+
+def logs_of_roles(logs: Sequence[ExperimentLog], label: str) -> Logs:
+    """Return the logs by what they are for, without plans.
+
+    Raises:
+        NothingMatched: C06, no log to fit.
+        InputRejected: D14, one recording in two roles.
+    """
+    known = [log for log in logs if log.origin != "planned"]
+    chosen = Logs.by_role(known)
+    if not chosen.identify:
+        kinds = ", ".join(sorted({f"{log.experiment} ({log.role})" for log in known})) or "none"
+        raise NothingMatched(
+            "C06",
+            f"no excitation, free or writing log of role identify; there are: {kinds}",
+            where=label,
+            remedy="record an excitation, or name the logs to fit: --identify PATH",
+        )
+    refuse_leak(chosen.identify, chosen.validate)
+    refuse_leak(chosen.reference, (*chosen.identify, *chosen.validate))
+    return chosen
 
 
 @dataclass(frozen=True, eq=False)
