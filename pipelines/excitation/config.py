@@ -83,7 +83,6 @@ class ExcitationConfig:
     slowest: float = 0.05
     # figures
     points: int = 1000  # of a curve
-    costly: float = 0.01  # share of the cost above which a limit is named
 
 
 CONFIG = ExcitationConfig()

@@ -1,8 +1,8 @@
 """Keep a motion within its limits: what they are, the tip, and a barrier for the search.
 
 The barrier is B = -(1/n) Σ_k log(1 - g_k²), g = (y - middle)/half (Boyd & Vandenberghe 2004, ch.
-11.2), continued close to the limit by a parabola, so that a step of the search may cross it. At a
-minimum, ∂B/∂(log half) says what the limit costs. The tip and its adjoint are
+11.2), continued close to the limit by a parabola, so that a step of the search may cross it. The
+tip and its adjoint are
 
     x = tip(q),   v = J q̇,   ∂x/∂q_m = J_m,   ∂v/∂q_m = Σ_i (z_min(i,m) × J_max(i,m)) q̇_i
 
@@ -21,7 +21,7 @@ from pipelines.dynamics.kinematics import SerialChain, forward_kinematics
 from pipelines.excitation.config import CONFIG
 from pipelines.io.robot import RobotDescription
 
-__all__ = ["Limit", "TipMotion", "barrier", "cost_of_limits", "limits_of", "middle_and_half",
+__all__ = ["Limit", "TipMotion", "barrier", "limits_of", "middle_and_half",
            "tip_motion"]
 
 FAR = 100.0 * np.pi  # numerics: an open end of a limit, which no motion comes near to
@@ -93,13 +93,6 @@ def barrier(signals: Array, middle: Array, half: Array) -> tuple[float, Array, b
     value = np.where(over > 0.0, first * over + 0.5 * second * over**2, 0.0) - np.log(slack)
     slope = np.where(over > 0.0, np.sign(g) * (first + second * over), 2.0 * g / slack)
     return float(value.sum()) / count, slope / (count * half[:, None]), most < 1.0
-
-
-def cost_of_limits(signals: Array, middle: Array, half: Array) -> Array:
-    """Return -∂B/∂(log half) (limits,), as a share of their sum."""
-    g = (signals - middle[:, None]) / half[:, None]
-    cost = (2.0 * g * g / (1.0 - g * g)).mean(axis=1)
-    return np.asarray(cost / max(float(cost.sum()), 1e-300))
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,10 +56,9 @@ class Design:
     evaluations: int  # of the search: as many give the same design again
     found_at: int  # evaluation of the best one
     stopped: int  # exit code of the signal that ended the search early; 0 where none did
-    peaks: tuple[Peak, ...]  # with the cost of each limit
+    peaks: tuple[Peak, ...]
     shrunk: float  # factor on the motion so that its limits hold between samples
     reached: bool  # the ceiling on the condition number, kept by this motion as it is
-    shrunk_for: tuple[str, ...] = ()  # the limits, in words, that asked for it
 
 
 def landscape(task: Task, share: int = 1, density: int = CONFIG.density) -> DesignProblem:
@@ -197,18 +196,15 @@ def design(task: Task, effort: Effort, seed: int = 0) -> Design:
 def finished(task: Task, x: Array, evaluations: int, found_at: int, stopped: int) -> Design:
     """Return the design at `x`, changed until its limits hold between samples too."""
     final = final_problem(task)
-    x, factor, why = _smaller(task, final, x)
+    x, factor = _smaller(task, final, x)
     trajectory = Trajectory(final.space.series(x), task.periods)
     if not task.rest:
         trajectory = _with_run_in(task, trajectory)
-    cost = final.cost(final.sized(x, CONFIG.corner, 1.0))
-    found = tuple(replace(peak, cost=float(share))
-                  for peak, share in zip(_peaks(task, trajectory), cost, strict=True))
+    found = _peaks(task, trajectory)
     goal = task.problem.goal
     grams = grams_of(task.problem.columns, final.space.motion(x, final.samples))
     reached = goal.meets(goal.figures(grams).condition_number)
-    return Design(trajectory, evaluations, found_at, stopped, found, factor, reached,
-                  (why,) if why else ())
+    return Design(trajectory, evaluations, found_at, stopped, found, factor, reached)
 
 
 def _refuse_impossible(task: Task, fine: DesignProblem, rng: np.random.Generator) -> None:
@@ -231,17 +227,16 @@ def _refuse_impossible(task: Task, fine: DesignProblem, rng: np.random.Generator
         remedy="start elsewhere (--home), or correct that limit")
 
 
-def _smaller(task: Task, final: DesignProblem, x: Array) -> tuple[Array, float, str]:
-    """Return x made smaller until its limits hold, the factor, and the limit farthest beyond."""
-    whole, why = 1.0, ""
+def _smaller(task: Task, final: DesignProblem, x: Array) -> tuple[Array, float]:
+    """Return x made smaller until its limits hold, and the factor."""
+    whole = 1.0
     for _ in range(SHRINKINGS):
         nearest = worst(_peaks(task, Trajectory(final.space.series(x), 1)))
         if nearest is None or nearest.share <= 1.0:
-            return x, whole, why
-        why = why or nearest.quantity + (f" of joint {nearest.joint}" if nearest.joint else "")
+            return x, whole
         factor = min(1.0 / nearest.share, CONFIG.corner)
         x, whole = final.space.shrunk(x, factor), whole * factor
-    return final.space.shrunk(x, 0.0), 0.0, why
+    return final.space.shrunk(x, 0.0), 0.0
 
 
 def _peaks(task: Task, trajectory: Trajectory) -> tuple[Peak, ...]:

@@ -20,7 +20,6 @@ from pipelines.excitation.constraints import (
     Limit,
     TipMotion,
     barrier,
-    cost_of_limits,
     middle_and_half,
     tip_motion,
 )
@@ -138,10 +137,6 @@ class DesignProblem:
         """Return how near each limit is approached (limits,): 1 is the limit."""
         g = np.abs(self._evaluated(x)[2] - self.middle[:, None]) / self.half[:, None]
         return np.asarray(g.max(axis=1, initial=0.0))
-
-    def cost(self, x: Array) -> Array:
-        """Return the share (limits,) of each limit in what all limits cost."""
-        return cost_of_limits(self._evaluated(x)[2], self.middle, self.half)
 
     def start(self, rng: np.random.Generator, reach: float = CONFIG.roomy) -> Array:
         """Return a random motion that approaches its limits to `reach`."""

@@ -90,7 +90,6 @@ class Result:
     stopped: int = field(default=0, metadata=NOT_STORED)  # exit code of the signal
     reached: bool = True
     shrunk: float = 1.0
-    shrunk_for: tuple[str, ...] = ()  # the limits, in words, that asked for it
     parameters: tuple[ParameterStd, ...] = ()
     course: Course | None = None
     period: float = 0.0  # [s]
@@ -109,16 +108,6 @@ class Result:
     logs: tuple[tuple[str, ExperimentLog], ...] = field(default=(), metadata=NOT_STORED)
     table: ControllerTable | None = field(default=None, metadata=NOT_STORED)
     coefficients: dict[str, object] | None = field(default=None, metadata=NOT_STORED)
-
-    @property
-    def dearest(self) -> str:
-        """The limit that costs most, in words; empty where none costs anything worth naming."""
-        top = max(self.limits, key=lambda one: one.cost, default=None)
-        if top is None or top.cost < CONFIG.costly:
-            return ""
-        if top.joint is None:
-            return f"limit of {top.quantity}"
-        return f"{top.quantity} limit of joint {top.joint}"
 
 
 def _of_task(task: Task, purpose: str, seed: int) -> Result:
@@ -171,7 +160,7 @@ def judged(task: Task, design: Design, apart: Apart | None, seed: int) -> Result
         ceiling=goal.ceiling, lower_bound=LOWER_BOUND if bounded else None,
         evaluations=design.evaluations, found_at=design.found_at, interrupted=design.stopped > 0,
         stopped=design.stopped, reached=goal.meets(figures.condition_number),
-        shrunk=design.shrunk, shrunk_for=design.shrunk_for, parameters=parameters,
+        shrunk=design.shrunk, parameters=parameters,
         course=Course(t, q, dq, ddq, tau),
         period=series.period, periods=trajectory.periods, run_in=trajectory.run_in,
         duration=trajectory.duration, noise=tuple(map(float, goal.noise)),
@@ -183,9 +172,8 @@ def doubts(result: Result) -> tuple[Check, ...]:
     """Return C08 where a ceiling was not reached."""
     if result.reached:
         return ()
-    dear = f"; the {result.dearest} is most in the way" if result.dearest else ""
-    words = f"a condition number of {result.ceiling:g} was not reached{dear}"
-    remedy = "search longer, give more harmonics, or widen that limit"
+    words = f"a condition number of {result.ceiling:g} was not reached"
+    remedy = "search longer, give more harmonics, or widen the limits that it uses up"
     return (Check.of("C08", "warn", words, where=result.robot, gate=True, remedy=remedy),)
 
 

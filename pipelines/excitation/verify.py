@@ -34,7 +34,6 @@ class Peak:
     limit: float  # that end
     unit: str
     share: float  # 1 is the limit: of the way from the middle of the range, or from zero
-    cost: float = 0.0  # share of what all limits together cost the design
 
 
 def peaks(limits: Iterable[Limit], chain: SerialChain, motion: Array, arm: Arm | None, *,

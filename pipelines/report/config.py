@@ -36,7 +36,6 @@ class ReportConfig:
     near_rest: float = 0.04  # of the fastest speed, below which friction changes its sign
     chance: float = 6.0  # standard deviations; noise is further off in one sample of 5e8
     near_bound: float = 1.5  # times the bound of a condition number, up to which it is a percentage
-    costly: float = 0.02  # share of the cost of a plan, that is worth naming
     alike: float = 0.8  # similarity from which two causes explain the same
     much: float = 0.01  # relative change of a motion, that belongs into the verdict
     drawn_limit: float = 0.6  # of a limit, from which on the limit is drawn beside the signal

@@ -58,7 +58,7 @@ def _tone(result: Result) -> Tone:
 def _smaller(result: Result) -> str:
     """By how much the motion was made smaller after its search; empty where it was not."""
     less = 1.0 - result.shrunk
-    return "" if less < _SHOWN else _say("smaller", less, result.shrunk_for)
+    return "" if less < _SHOWN else _say("smaller", less)
 
 
 def _are_rivals(found: Apart | None) -> bool:
@@ -175,18 +175,11 @@ def _limits(result: Result) -> Section:
             one.limit,
             format_unit(one.unit),
             100 * one.share,
-            100 * one.cost,
         )
         for one in result.limits
     )
-    costly = sorted(result.limits, key=lambda one: -one.cost)
-    dear = [
-        f"{one.quantity} of {'the tip' if one.joint is None else place(one.joint)}"
-        for one in costly
-        if one.cost > REPORT.costly
-    ]
-    columns = ("joint", "of", "peak", "limit used", "unit", "of it [%]", "cost [%]")
-    text = _paragraphs("limits", result, _smaller(result), dear[:3])
+    columns = ("joint", "of", "peak", "limit used", "unit", "of it [%]")
+    text = _paragraphs("limits", result, _smaller(result))
     return Section("Limits", text, (Table(columns, rows),))
 
 
