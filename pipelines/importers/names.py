@@ -1,7 +1,7 @@
 """Read from a column's name which quantity it holds, and whether it was measured or commanded.
 
 A name is split into words: at signs, at changes of case, between letters and digits, and where two
-known words are written as one ("jointpos", "taucmd"). The last word that names a quantity decides:
+known words are joined ("jointpos", "taucmd"). The last word that names a quantity decides:
 a "torque current" is a current. English and German are known; of other words, the draft asks.
 """
 

@@ -31,7 +31,7 @@ from pipelines.io.log import Array
 from pipelines.io.units import UNITS
 
 SIGNALS = ("q", "dq", "tau")
-_Column = tuple[str, ColumnName, int | None]  # its name, what it says, the robot's joint in it
+_Column = tuple[str, ColumnName, int | None]  # column, its words, the robot's joint in it
 
 
 @dataclass(frozen=True)

@@ -345,6 +345,12 @@ def _whole_lines(
         remedy = "record again, or copy the file again"
         raise InputRejected("T08", "no whole line of numbers", source, remedy)
     table, wrong = _columns([body[i] for i in good], dialect, names, source)
+    for number, line in (body[good[k]] for k in wrong):
+        cells = dialect.cells(line)
+        if not any(map(dialect.is_number, cells)) and names_and_units(cells)[0] != names:
+            message = f"a further table begins, of {', '.join(cells[:3])[:60]} …"
+            where, remedy = f"{source}, line {number}", "save each table in a file of its own"
+            raise InputRejected("F16", message, where, remedy)
     damage |= {good[k]: reason for k, reason in wrong.items()}
     if damage:
         first = sorted(damage)[: TEXT.most_damaged]

@@ -150,3 +150,11 @@ def test_units_in_the_header_are_found() -> None:
     table = parse("\n".join([below[0], "s,rad,rad,rad,Nm,Nm,Nm", *below[1:]]) + "\n")
     assert table.units["tau_3"] == "Nm"
     assert equal(table)
+
+
+def test_f16_a_further_table_below_the_first_is_refused_with_its_line() -> None:
+    """Its numbers would go on under the names of the first."""
+    rows = lines()
+    names = ",".join(f"other_{k}" for k in range(7))
+    with pytest.raises(InputRejected, match=r"RRID-F16.*line 602.*a further table begins, of other_0.*file of its own"):
+        parse("\n".join([*rows[:601], names, *rows[601:]]) + "\n")
