@@ -33,7 +33,7 @@ from pipelines.io.sandbox import parse_toml
 from pipelines.io.units import UNITS, canonical_unit
 
 _ANGLES = {unit: UNITS[unit].factor for unit in ("rad", "deg", "rev", "mrad")}
-_SPEEDS = {unit: UNITS[unit].factor for unit in ("rad/s", "deg/s", "rev/s", "rpm", "mrad/s")}
+_SPEEDS = {unit: UNITS[unit].factor for unit in ("rad/s", "deg/s")}
 _TIMES = {unit: UNITS[unit].factor for unit in ("s", "ms", "us", "ns")}
 
 
@@ -233,6 +233,10 @@ class _Units:
             self.tau = Guess("", f"{why}links ask for: another unit or sign, or the motor's side?")
         elif proved and self.q.value and not _own(group):
             self.tau = Guess("N m", f"{follows} in N m")
+        elif self.tau.value and not proved:
+            share = f"{100.0 * (1.0 - own.unexplained):.0f} %"
+            why = f"named so, but the robot's links explain {share} of it: order, zero, side?"
+            self.tau = replace(self.tau, why=why, sure=False)
         if group.name.origin == "commanded" and not proved:
             self.doubt = "the command is not the torque that the robot's own links ask for"
 

@@ -23,7 +23,7 @@ import numpy as np
 from pipelines.errors import Check, EnvironmentFault, InputRejected, UsageError
 from pipelines.importers import matlab, npy
 from pipelines.importers.config import ARRAYS
-from pipelines.importers.raw import RawTable, table_of
+from pipelines.importers.raw import RawTable, flatten, table_of
 from pipelines.importers.recipe import TextFormat
 from pipelines.importers.text import read_text
 from pipelines.io.limits import FEWEST
@@ -256,7 +256,7 @@ def _series(document: Any) -> Any:
     found: dict[str, Any] = {}
     if isinstance(document, dict):
         found = {name: x for name, x in document.items() if not isinstance(x, list)}
-    frame = pd.json_normalize(frames, max_level=ARRAYS.deepest)
+    frame = pd.DataFrame([dict(flatten(one)) for one in frames])
     for name, column in frame.items():
         first = column.iloc[0]
         if isinstance(first, str):
