@@ -4,8 +4,8 @@
     entry = store.keep(stage, key, ...)  a new one, there whole or not at all
 
 A key is everything that a result depends on, as groups of named values. Only contents are compared,
-never times. Results of the last run lie in OUT/.cache/STAGE beside the files of OUT/STAGE; those of
-a killed run lie alike in a hidden folder beside OUT, until the next run has ended.
+never times. Results of the last run lie in OUT/.cache/STAGE beside the files of OUT/STAGE; new ones
+lie alike in a hidden folder beside OUT, until they are put into the output.
 """
 
 from __future__ import annotations
@@ -27,7 +27,13 @@ from typing import Any
 import pipelines
 from pipelines.errors import EnvironmentFault, clean
 from pipelines.io.hdf5 import read_series, write_series
-from pipelines.io.output import environment_faults, hash_file, listed_outputs, slug
+from pipelines.io.output import (
+    environment_faults,
+    hash_file,
+    listed_outputs,
+    remove_folder,
+    staging_folder,
+)
 from pipelines.io.results import encode, json_text
 from pipelines.report.style import STYLE_FILE
 
@@ -184,26 +190,20 @@ class Store:
 
     def __init__(self, out: Path, no_cache: bool = False) -> None:
         self.out, self.no_cache = out, no_cache
-        place = out.absolute()
-        self.unfinished = place.parent / f".rrrid-unfinished-{slug(place.name)}"
-        self._held: contextlib.ExitStack | None = None
+        self.new: Path | None = None  # the folder of what this run has computed
 
     def recall(self, stage: str, key: Key | None = None) -> Entry | str:
         """Return the stored result of `key`, or of any key; or why it must be computed."""
         if self.no_cache:
             return "everything is asked to be computed anew"
-        why = "for the first time here"
-        for root in (self.unfinished, self.out):
-            about = _about(root, stage)
-            if about is None:
-                continue
-            if key is not None and about["digest"] != digest_of_json(key):
-                why = changes(about["key"], key)
-            elif damaged := [n for n, sha in about["files"].items() if not _is_whole(root, n, sha)]:
-                why = f"what is stored is damaged: {damaged[0]}"
-            else:
-                return Entry(root, stage, about)
-        return why
+        about = _about(self.out, stage)
+        if about is None:
+            return "for the first time here"
+        if key is not None and about["digest"] != digest_of_json(key):
+            return changes(about["key"], key)
+        if damaged := [n for n, sha in about["files"].items() if not _is_whole(self.out, n, sha)]:
+            return f"what is stored is damaged: {damaged[0]}"
+        return Entry(self.out, stage, about)
 
     def keep(
         self,
@@ -220,11 +220,12 @@ class Store:
             result: the JSON object and its series; None where the stage had none.
             write: writes the stage's own files into the folder it is given.
         """
-        root, folder = self.unfinished, self.unfinished / CACHE / stage
+        if self.new is None:
+            self.new = staging_folder(self.out.absolute())
+        root, folder = self.new, self.new / CACHE / stage
         with environment_faults(root):
-            for old in (folder, root / stage):
-                shutil.rmtree(old, ignore_errors=True)
-                old.mkdir(parents=True)
+            for place in (folder, root / stage):
+                place.mkdir(parents=True)
             write(root / stage)
             if result is not None:
                 (folder / "result.json").write_text(json_text(result[0]), encoding="utf-8")
@@ -238,18 +239,10 @@ class Store:
             (folder / "entry.json").write_text(text, encoding="utf-8")
         return Entry(root, stage, told)
 
-    def hold(self) -> None:
-        """Lock the hidden folder (P08)."""
-        held = contextlib.ExitStack()
-        held.enter_context(locked(self.unfinished, self.out))
-        self._held = held
-
-    def release(self, finished: bool = True) -> None:
-        """Let go of it; unless the run was interrupted, it is removed."""
-        if self._held is not None:
-            if finished:
-                shutil.rmtree(self.unfinished, ignore_errors=True)
-            self._held.close()
+    def release(self) -> None:
+        """Remove what was not put into an output."""
+        if self.new is not None:
+            remove_folder(self.new)
 
 
 def _about(root: Path, stage: str) -> dict[str, Any] | None:

@@ -6,9 +6,9 @@ Writes   result.json with every stage's result, one report.html, and each stage'
 Source   cli-contract.md; the order is the way of the data: what a stage finds, the next ones use
 
 Only what changed is computed again (`pipelines/cache.py`): a stage whose logs, settings, code,
-libraries and stages before it are the same is taken from the last run in the same output folder, or
-from one that was killed there. Takes some 60 s for three joints and two minutes of motion, and some
-seconds where nothing has changed.
+libraries and stages before it are the same is taken from the last run in the same output folder.
+Takes some 60 s for three joints and two minutes of motion, and some seconds where nothing has
+changed.
 """
 
 from __future__ import annotations
@@ -124,7 +124,6 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     """Run every stage on what those before it leave; take what is unchanged from the cache."""
     _refuse_unknown(settings)
     given: Material = inputs.material
-    given.store.hold()
     chain, steps = Chain(inputs), []
     for stage, own in _wanted(settings):
         key = chain.key(stage, own)
@@ -408,6 +407,6 @@ STAGE = Stage(
     _exit_code,
     _checks,
     remakes=_remakes,
-    ended=lambda inputs, finished: inputs.material.store.release(finished),
+    ended=lambda inputs: inputs.material.store.release(),
     sessions="one",
 )

@@ -123,8 +123,7 @@ class Stage(Generic[S, R]):
     beside: Callable[[S, Request], Beside] | None = None
     in_run: S | None = None  # settings within `run`, where they are others than by default
     remakes: Callable[[str], bool] = lambda name: False  # own files, made again if changed (P10)
-    # called at the end; `finished`: not by a signal
-    ended: Callable[[Inputs, bool], None] = lambda inputs, finished: None
+    ended: Callable[[Inputs], None] = lambda inputs: None  # called at the end, whatever it is
     # logs that must be of one robot and day: those of a folder, or all
     sessions: Literal["", "folder", "one"] = ""
 
@@ -192,10 +191,8 @@ def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
         answer = answered(stage, request, settings, inputs, described, started)
         request.tell("writing the report")
         object_ = answer.write(out)
-    except BaseException as problem:
-        stage.ended(inputs, isinstance(problem, Exception))
-        raise
-    stage.ended(inputs, True)
+    finally:
+        stage.ended(inputs)
     words = "was not what rrrid had written there; it was made again"
     remedy = "look after the disk, or keep your own changes in another folder"
     remade = (Check.of("P10", "warn", words, where=name, remedy=remedy) for name in changed)

@@ -152,27 +152,6 @@ def test_a_damaged_store_is_computed_again(small: Path, file: str) -> None:
     assert contents(small / "out", "provenance.json") == before
 
 
-@pytest.mark.row("P07")
-def test_an_interrupted_run_goes_on(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """P07: what was finished before the interruption is not computed again, and the end is that of an uninterrupted run."""
-    before = contents(small / "out", "provenance.json")
-    shutil.rmtree(small / "out")
-    frf = import_module("pipelines.frf")
-
-    def stopped(inputs: Any, settings: Any) -> Any:
-        raise KeyboardInterrupt
-
-    stopped.__module__ = frf.__name__
-    monkeypatch.setattr(frf, "STAGE", replace(frf.STAGE, compute=stopped))
-    with pytest.raises(KeyboardInterrupt):
-        go(small, no_report=True)
-    assert not (small / "out").exists()
-    monkeypatch.undo()
-    assert go(small, no_report=True)[1] == ["frf"]
-    assert contents(small / "out", "provenance.json") == before
-    assert sorted(p.name for p in small.iterdir()) == ["logs", "out"]
-
-
 class Shut(ExperimentLog):
     """A log that says what it is, and shows no sample."""
 
