@@ -54,10 +54,7 @@ class UrdfConfig:
 
     size: int = 16_000_000  # [B]
     depth: int = 100  # nested elements
-    elements: int = 100_000
-    links: int = 1000  # a humanoid with hands has a tenth of it
     number: float = 1e9  # squares and products of it stay finite; a larger limit means no limit
-    no_limit: float = 1e16  # what URDFs write for no limit
     short: float = 1e-9  # length of an axis without direction
     longest: float = 100.0  # [m] no arm has such a link
     rounding: float = 0.01  # of the trace: an inertia of two digits has half a percent

@@ -141,9 +141,7 @@ def _one_way_friction(subjects: Iterable[Subject]) -> list[Check]:
     for (_, joint), members in groups.items():
         ups, downs, logs = zip(*members, strict=True)
         if min(max(ups), max(downs)) < CONFIG.one_way:
-            words = (
-                f"the speed of joint {joint + 1} never changes sign in its friction logs: Coulomb "
-            )
-            words += f"offset unidentifiable joint {joint + 1}"
+            words = f"the speed of joint {joint + 1} never changes sign in its friction logs: "
+            words += f"Coulomb offset unidentifiable joint {joint + 1}"
             found.append(logs[0].say("D10", "warn", words, remedy, True, signal="q", joint=joint))
     return found

@@ -11,9 +11,7 @@ class QualityConfig:
 
     # clock
     no_time: float = 1e20  # [s] no time stamp: nanoseconds since 1970 are 2e18
-    unit_fits: float = (
-        0.02  # relative difference of the steps of t from a sample time in their unit
-    )
+    unit_fits: float = 0.02  # relative difference of the steps of t from a sample time
     stale_share: float = 0.05  # of the samples that repeat the one before: fewer do no harm
     stale_together: float = 0.95  # of one channel's repeats that are repeats of all channels
     even: float = 0.5  # sample times by which an interval may differ where no sample is missing
@@ -69,10 +67,6 @@ class QualityConfig:
     often: float = 0.9  # quantile of a torque that is compared with `far`
     far: float = 5.0  # times its limit: a controller that winds up gets there for moments only
     small: float = 0.02  # of the torque limit: no arm uses less of the drives of all its joints
-    rare_hz: float = 10.01  # hardly any controller records that slowly; 10 kHz in ms is 10 Hz
-    creeps: float = 0.02  # [rad/s] a degree a second, at the fastest joint's fastest
-    usual_speed: tuple[float, float] = (0.1, 30.0)  # [rad/s] fastest joint of an identified arm
-    usual_hz: tuple[float, float] = (20.0, 1e5)  # rates of recorders
 
 
 CONFIG = QualityConfig()

@@ -67,9 +67,8 @@ def limits(s: Subject) -> Sequence[Check | NotTested]:
             ("acceleration", acceleration[j], greatest, s.unit("ddq_ref", j)),
         ):
             if value > CONFIG.limit_slack * limit:
-                words = (
-                    f"the {name} reaches {value:.4g} {unit}, {value / limit:.3g} times its limit"
-                )
+                words = f"the {name} reaches {value:.4g} {unit}, "
+                words += f"{value / limit:.3g} times its limit"
                 remedy, gate = (
                     "move slower, or correct the limit",
                     value > CONFIG.limit_gate * limit,

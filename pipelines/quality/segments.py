@@ -320,9 +320,7 @@ def _saturated(log: ExperimentLog) -> Mask:
     """Return where the drive could not give the torque: at its limit, or at a flat top."""
     tau, limit = np.abs(log.tau), torque_limit(log)
     at_limit = np.asarray(tau >= CONFIG.at_limit * limit)
-    if (
-        log.torque == "measured"
-    ):  # a measured torque beyond the limit shows that the limit is not one
+    if log.torque == "measured":  # beyond the limit it shows that the limit is not one
         at_limit &= ~(tau > CONFIG.beyond * limit).any(axis=0)
     open_loop = log.controller is not None and log.controller.law == "open-loop"
     if open_loop or log.experiment in ("friction", "hold", "frf"):

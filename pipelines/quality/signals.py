@@ -35,10 +35,8 @@ def missing_samples(s: Subject) -> list[Check]:
             elif at.size > CONFIG.gone * len(undefined):
                 found.append(s.say("D02", "reject", words, _REPAIR, **place))
             elif blocks:
-                words = (
-                    f"{at.size} samples of {name} are missing, {many(blocks, 'time')} more than "
-                )
-                words += f"{GAP_LIMIT} in a row; the log is split there"
+                words = f"{at.size} samples of {name} are missing, {many(blocks, 'time')} more "
+                words += f"than {GAP_LIMIT} in a row; the log is split there"
                 found.append(s.say("D02", "repair", words, _REPAIR, **place))
             else:
                 words = f"{many(at.size, 'sample')} of {name} missing, never more than {GAP_LIMIT} "
@@ -81,9 +79,8 @@ def constant_channels(s: Subject) -> list[Check]:
             words = f"q of joint {j + 1} is constant ({q[0]:.6g})"
             found.append(s.say("D04", "reject", words, _REPAIR, signal="q", joint=j))
         moves = j in s.moving or s.travel[j] > CONFIG.moved
-        steady = (
-            log.experiment == "friction" and tau[0] != 0.0
-        )  # a constant torque drives the joint
+        # a constant torque drives the joint
+        steady = log.experiment == "friction" and tau[0] != 0.0
         if torque[j] == 0.0 and moves and not steady:
             words = f"tau of joint {j + 1} is constant ({tau[0]:.6g}) while the joint moves"
             found.append(s.say("D04", "reject", words, _REPAIR, signal="tau", joint=j))
@@ -95,19 +92,14 @@ def saturation(s: Subject) -> list[Check]:
     found, tau, limits = [], np.abs(s.good.log.tau), torque_limit(s.log)
     for j, at in flagged(s.good.saturated):
         least, peak, limit = float(tau[at, j].min()), float(tau[at, j].max()), limits[j]
-        where = f"at the described limit of {limit:.4g}"
+        where = f"at or beyond the described limit of {limit:.4g}, up to {peak:.4g}"
         if least < 0.99 * limit:
             where = f"at a flat top at {least:.4g}"
-        elif peak > CONFIG.beyond * limit:  # commands, which the drive cuts
-            where = f"at or beyond the described limit of {limit:.4g}, up to {peak:.4g}"
         share, unit = at.size / len(tau), s.unit("tau", j)
         words = f"{percent(share, 2)} of the torque samples lie {where} {unit}; no fit uses them"
         remedy = "move slower or with less acceleration; a saturated drive hides what the arm needs"
         if peak > CONFIG.twice * limit:
-            remedy += (
-                f"; if no command was {peak / limit:.2g} times the limit, look for a gear ratio "
-            )
-            remedy += "or torque constant applied twice, or correct the robot's description"
+            remedy += "; or look for a gear ratio or torque constant applied twice"
         place = Place(signal="tau", joint=j, sample=int(s.good.kept[at[0]]))
         found.append(s.say("D05", "warn", words, remedy, share > CONFIG.saturated, **place))
     peaks = s.with_units("tau", np.nanmax(tau, axis=0, initial=0.0).tolist())
@@ -136,10 +128,8 @@ def wraps(s: Subject) -> list[Check]:
         found.append(s.say("D07", "warn", words, "let the recorder count turns", **place))
     for j, at in flagged(s.good.jumped[1:]):
         by = f"{jumped[at[0], j]:.4g} {s.unit('q', j)}"
-        words = (
-            f"the position jumps {many(at.size, 'time')}, first by {by}, which is no turn and no "
-        )
-        words += "counter's range; the log is split there"
+        words = f"the position jumps {many(at.size, 'time')}, first by {by}, which is no turn and "
+        words += "no counter's range; the log is split there"
         place = Place(signal="q", joint=j, sample=int(s.good.kept[at[0] + 1]))
         remedy = "look at the encoder: it loses counts"
         found.append(s.say("D07", "warn", words, remedy, True, **place))
