@@ -151,7 +151,11 @@ def replace_folder(staging: Path, target: Path) -> None:
             if old.exists():
                 os.replace(old, target)
             raise
-        remove_folder(old)
+        try:
+            if old.exists():
+                shutil.rmtree(old)
+        finally:
+            remove_folder(old)
         _sync(target.parent)
 
 
