@@ -34,12 +34,13 @@ def torque_unit(s: Subject) -> Sequence[Check | NotTested]:
         return s.ok("S05", words, signal="tau")
     words = f"tau is declared in {unit}, but a tenth of joint {j + 1}'s samples are beyond "
     words += f"{often[j]:.0f} times its limit of {limit[j]:.4g} {unit}, which no drive gives"
+    remedy = "if it is current, import the recording with the torque constants; or correct the "
+    remedy += "torque limits of the robot's description (--robot)"
     for smaller in ("N cm", "N mm") if s.log.robot.joints[j].revolute else ("mN",):
         factor = UNITS[smaller].factor
         if CONFIG.small <= peak.max() * factor <= CONFIG.limit_slack:
             words += f"; this looks like {smaller} ({1.0 / factor:g} times too large)"
-    remedy = "declare the unit the numbers are in; if they are current, import the recording with "
-    remedy += "the torque constants; or correct the torque limits of the description (--robot)"
+            remedy = f"write so to the file: {_written('tau', smaller)}; {remedy}"
     if ((peak >= CONFIG.small) & (peak <= 1.0)).any():  # a unit is that of all joints
         words += "; or its controller winds up, for other joints are within their limits"
     level: Level = "warn" if s.log.torque == "measured" else "reject"
@@ -54,9 +55,9 @@ def degrees(s: Subject) -> Sequence[Check | NotTested]:
         return s.cannot_tell("S07", words, signal="q")
     found, speed = [], peak_speed(s)
     reach = np.maximum(np.nanmax(np.abs(s.position), axis=0, initial=0.0), s.travel)
-    remedy = "if degrees, declare the units deg, deg/s and deg/s^2 in the file, and leave out its "
-    remedy += "digest; if of the motor side, import the recording anew with the gear ratios; else "
-    remedy += "correct the limits of the robot's description (--robot)"
+    remedy = f"if degrees, write so to the file: {_written('q', 'deg')} (likewise deg/s, deg/s^2); "
+    remedy += "if of the motor side, import the recording anew with the gear ratios; else correct "
+    remedy += "the limits of the robot's description (--robot)"
     for j, joint in enumerate(joints):
         bound = max(map(abs, joint.position)) if np.isfinite(joint.position).all() else np.inf
         times = np.array([reach[j] / bound, speed[j] / joint.velocity])
@@ -69,6 +70,10 @@ def degrees(s: Subject) -> Sequence[Check | NotTested]:
     travel = s.with_units("q", s.travel.tolist())
     words = f"angles: {travel} of travel, speeds as the limits allow"
     return found or s.ok("S07", words, signal="q")
+
+
+def _written(signal: str, unit: str) -> str:
+    return f'units = "{unit}" of /signals/{signal}, without the attribute digest of /'
 
 
 def degrees_or_motor(reach: float, bounds: tuple[float, float]) -> str:
