@@ -190,24 +190,6 @@ def _whole_number(digits: str) -> int:
     return int(digits)
 
 
-def stored_result(path: Path, command: str) -> dict[str, Any] | None:
-    """Return the object of the result.json of `command` in `path`; None where there is none.
-
-    Raises:
-        InputRejected: F17, it was written by an earlier rrrid.
-    """
-    file = path / "result.json" if path.is_dir() else path
-    if file.name != "result.json" or not file.is_file():
-        return None
-    try:
-        found = read_result(file)
-    except InputRejected as problem:
-        if problem.code == "RRID-F17":
-            raise
-        return None  # of another program
-    return found.object if found.command == command else None
-
-
 def result_schema(kind: type[Any], command: str) -> dict[str, Any]:
     """Return the JSON Schema of the result.json of `command`, whose result is a `kind`.
 
