@@ -111,7 +111,7 @@ def self_test() -> Iterator[Finding]:
 
     log = example_session()[0]
     with tempfile.TemporaryDirectory(prefix="rrrid-doctor-") as folder:
-        for name, work in (
+        jobs: tuple[tuple[str, Callable[[], str]], ...] = (
             ("simulating a log", lambda: f"{log.n_samples} samples in closed loop"),
             ("HDF5 log, written and read", partial(_round_trip, Path(folder) / "a.h5", log)),
             (
@@ -121,7 +121,8 @@ def self_test() -> Iterator[Finding]:
             ("base parameters", partial(_fitted, log)),
             ("observer", _observed),
             ("figure", _drawn),
-        ):
+        )
+        for name, work in jobs:
             began = time.perf_counter()
             try:
                 words = f"{work()}, {time.perf_counter() - began:.1f} s"

@@ -208,8 +208,8 @@ def _prepare_streams(as_json: bool) -> None:
             null = os.open(os.devnull, os.O_RDWR)
             if null != number:  # a later file must not take the number
                 os.dup2(null, number)
-            stream = open(number, "r" if number == 0 else "w", encoding="utf-8")  # noqa: SIM115
-            setattr(sys, name, stream)
+            mode = "r" if number == 0 else "w"
+            setattr(sys, name, open(number, mode, encoding="utf-8"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if (configure := getattr(stream, "reconfigure", None)) is not None:
             configure(errors="replace")

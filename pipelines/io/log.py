@@ -292,11 +292,11 @@ def select_joints(
     chosen = np.array(joints) - 1
     samples = log.t.size if "t" in log else -1
 
-    def taken(values: Array | None) -> Array | None:
+    def taken(values: Array) -> Array:
         """Take the joints of (samples, joints), of the same turned round (S11), or of (joints,)."""
-        if values is not None and values.shape == (samples, columns):
+        if values.shape == (samples, columns):
             return np.ascontiguousarray(values[:, chosen])
-        return values[chosen] if values is not None and len(values) == columns else values
+        return values[chosen] if len(values) == columns else values
 
     signals = {
         name: signal if name == "t" else replace(signal, values=taken(signal.values))
@@ -304,10 +304,11 @@ def select_joints(
     }
     controller = log.controller
     if controller is not None:
-        changes: dict[str, Any] = {key: taken(getattr(controller, key)) for key in PER_JOINT}
+        given = {key: getattr(controller, key) for key in PER_JOINT}
+        changes: dict[str, Any] = {k: taken(own) for k, own in given.items() if own is not None}
         controller = replace(controller, **changes)
     joint = None if log.joint is None else joints.index(log.joint) + 1
-    posture = taken(log.posture)
+    posture = None if log.posture is None else taken(log.posture)
     return replace(log, signals=signals, joint=joint, posture=posture, controller=controller)
 
 
