@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.estimation.checks.channel_order import SIGNALS, ColumnOrder, search_orders
+from pipelines.estimation.checks.channel_order import ColumnOrder, search_orders
 from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.estimation.checks.gravity_fit import GravityFit, GravityModel
 from pipelines.estimation.checks.joint_rows import Sampled, sample_motion
@@ -277,20 +277,10 @@ class _Estimate:
         n = rows.n_joints
         same = JointOrder(tuple(range(1, n + 1)), "")
         mistaken = fits.best.score > fits.described.score + config.decisive
-        explained = fits.best.residual.max() < config.suspect
         travel = np.ptp(np.concatenate([motion.q for motion in self.motions]), axis=0)
         moving = np.flatnonzero(travel > config.held * travel.max()).tolist()
-        tried = search_orders(
-            self.arm,
-            self.motions[0],
-            self.described,
-            moving,
-            config.model_error,
-            (config.order_rows, config.orders),
-            -0.5 * float(np.sum(np.log(fits.best.variance))) - n,  # hopeless below
-            SIGNALS[:1] if explained else SIGNALS,
-            fits.best.rms > config.lost or (len(moving) <= config.few and not explained),
-        )
+        motion, best = self.motions[0], fits.best
+        tried = search_orders(self.arm, motion, self.described, moving, best, config)
         if not tried:
             return same, fits
         # all orders by one number of independent moments, that of the order that leaves the least

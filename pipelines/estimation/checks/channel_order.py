@@ -14,13 +14,15 @@ from itertools import combinations
 import numpy as np
 
 from pipelines.dynamics.chain import regressor
+from pipelines.estimation.checks.config import BoundaryConfig
+from pipelines.estimation.checks.gravity_fit import GravityFit
 from pipelines.estimation.checks.joint_rows import Sampled
 from pipelines.estimation.checks.torque_rows import Array, GenericArm, RowFilter, own_columns
 
-__all__ = ["SIGNALS", "ColumnOrder", "search_orders"]
+__all__ = ["ColumnOrder", "search_orders"]
 
 Order = tuple[int, ...]
-SIGNALS = ("q and tau", "tau", "q")
+_SIGNALS = ("q and tau", "tau", "q")
 _BEAM = 8  # numerics: orders that are kept at each exchange
 _RIDGE = 1e-9  # numerics: of equilibrated columns
 _ROUNDS = 4  # numerics: of reweighting, from what each joint by itself leaves
@@ -49,11 +51,8 @@ def search_orders(
     motion: Sampled,
     gravity: Array,
     moving: Sequence[int],
-    model_error: float,
-    size: tuple[int, int],
-    least: float,
-    signals: Sequence[str],
-    every: bool,
+    logged: GravityFit,
+    config: BoundaryConfig,
 ) -> tuple[ColumnOrder, ...]:
     """Return the best orders other than the logged one, best first.
 
@@ -62,13 +61,15 @@ def search_orders(
     Args:
         gravity: (3,) [m/s^2] under which orders are compared.
         moving: joints that move; the others keep their place.
-        size: moments that orders are compared with; how many orders are returned at most.
-        least: log likelihood a moment, below which an order is not returned.
-        signals: whose columns are exchanged.
-        every: go on where no exchange fits better than the log.
+        logged: the best fit of the columns as they are.
     """
-    moments, most = size
-    scorer = _Scorer(arm, motion.every(max(1, len(motion.t) // moments)), gravity, model_error)
+    explained = logged.residual.max() < config.suspect
+    signals = _SIGNALS[:1] if explained else _SIGNALS
+    # go on where no exchange fits better than the log
+    every = logged.rms > config.lost or (len(moving) <= config.few and not explained)
+    least = -0.5 * float(np.sum(np.log(logged.variance))) - len(logged.variance)  # hopeless below
+    thinned = motion.every(max(1, len(motion.t) // config.order_rows))
+    scorer = _Scorer(arm, thinned, gravity, config.model_error)
     same: Order = tuple(range(len(arm.chain.revolute)))
     scores: dict[ColumnOrder, float] = {}
     for signal in signals:
@@ -82,7 +83,7 @@ def search_orders(
             near = {_exchanged(order, a, b) for order in beam for a, b in combinations(moving, 2)}
             own |= {order: scorer(ColumnOrder(signal, order)) for order in near - own.keys()}
         scores |= {ColumnOrder(signal, order): x for order, x in own.items() if order != same}
-    ranked = sorted(scores.items(), key=lambda item: -item[1])[:most]
+    ranked = sorted(scores.items(), key=lambda item: -item[1])[: config.orders]
     return tuple(order for order, score in ranked if score > least)
 
 
