@@ -50,24 +50,6 @@ def test_the_good_log_itself_is_in_order(tmp_path: Path, command: Command) -> No
     assert (done.exit, {c["level"] for c in done.object["checks"]}) == (0, {"ok"})
 
 
-@pytest.mark.parametrize(("row", "ways"), [("S05", ("units = \"N mm\" of /signals/tau", "--robot")),
-                                           ("S07", ("units = \"deg\" of /signals/q", "--robot"))])
-def test_a_remedy_names_only_what_the_command_has(row: str, ways: tuple[str, ...], tmp_path: Path, command: Command) -> None:
-    """S05, S07: of a log, what to do with its file, and no word of recipes; --trust-units where there is such an option."""
-    fault = next(f for f in FAULTS if f.row == row)
-    write_log(tmp_path / "log.h5", fault.make(good_log()))
-    told = [c["remedy"] for c in command("inspect", "log.h5", "--no-report", "--out", "out").told(row)]
-    error = command("diagnose", "log.h5", "--no-report", "--out", "other").error
-    assert error["code"] == f"RRID-{row}"
-    for remedy in (*told, error["remedy"]):
-        assert all(way in remedy for way in ways)
-        assert "declare" not in remedy
-        assert not remedy.endswith("…")
-    assert "--trust-units" not in error["remedy"]
-    assert told
-    assert all("--trust-units" in remedy for remedy in told)
-
-
 @pytest.mark.parametrize(("signal", "unit"), [("tau", "N mm"), ("q", "deg")])
 def test_the_repair_that_is_named_is_one(signal: str, unit: str, tmp_path: Path, command: Command) -> None:
     """S05, S07: with the unit written to the file, and without the digest, the log is in order."""

@@ -34,6 +34,7 @@ def short(load: Load) -> list[ExperimentLog]:
     return [begun(log, 4000) for log in logs(load)[1:]]
 
 
+@pytest.mark.slow
 def test_cogging_is_found_at_its_joint_with_its_numbers() -> None:
     """And what is left is the noise of the drives, 20, 10 and 5 mN m, as far as the low-pass lets it through."""
     found = answered(Logs.by_role(short(wave)), exclude=but("cogging", "torque_offset", "quadratic_drag"))
