@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import rrrid
-from pipelines import estimate_bps, run
+from pipelines import run
 from pipelines.errors import UsageError
 from pipelines.stage import Request, run_stage
 
@@ -25,6 +25,11 @@ def loaded() -> rrrid.Answer:
 @pytest.fixture(scope="module")
 def model(loaded: rrrid.Answer) -> rrrid.Answer:
     return rrrid.estimate(rrrid.reconstruct(loaded))
+
+
+@pytest.fixture(scope="module")
+def saved(model: rrrid.Answer, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return model.save(tmp_path_factory.mktemp("saved") / "out")
 
 
 def test_import_loads_no_library_and_no_stage():
@@ -42,14 +47,6 @@ def test_chain_of_functions_gives_what_a_run_gives(model: rrrid.Answer, tmp_path
     assert model.result.relative_error == stored.relative_error
     for own, its in zip(model.result.parameters, stored.parameters, strict=True):
         assert (own.name, own.value, own.std) == (its.name, its.value, its.std)
-
-
-def test_stage_alone_gives_what_its_command_gives(loaded: rrrid.Answer, tmp_path: Path):
-    own = rrrid.estimate(loaded)
-    request = Request((LOGS,), out=tmp_path / "out", no_report=True)
-    command = run_stage(estimate_bps.STAGE, request, estimate_bps.Settings())
-    numbers = [one.value for one in own.result.parameters]
-    assert numbers == [one.value for one in command.result.parameters]
 
 
 def test_frame_has_a_row_a_parameter_with_its_std(model: rrrid.Answer):
@@ -71,9 +68,8 @@ def test_notebook_shows_verdict_and_key_figures(model: rrrid.Answer):
     assert model.summary[:40] in shown
 
 
-def test_saved_folder_is_that_of_the_command(model: rrrid.Answer, tmp_path: Path):
-    folder = model.save(tmp_path / "out")
-    names = {path.name for path in folder.iterdir()}
+def test_saved_folder_is_that_of_the_command(model: rrrid.Answer, saved: Path, tmp_path: Path):
+    names = {path.name for path in saved.iterdir()}
     assert {"result.json", "model.json", "report.html", "figures", "provenance.json"} <= names
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "notes.txt").write_text("mine")
@@ -82,10 +78,9 @@ def test_saved_folder_is_that_of_the_command(model: rrrid.Answer, tmp_path: Path
     assert (tmp_path / "mine" / "notes.txt").read_text() == "mine"
 
 
-def test_saved_model_is_simulated(model: rrrid.Answer, tmp_path: Path):
-    folder = model.save(tmp_path / "out")
+def test_saved_model_is_simulated(saved: Path):
     hold = rrrid.load(LOGS / "hold-1.h5")
-    simulated = rrrid.simulate(hold, folder / "model.json", windowed=True)
+    simulated = rrrid.simulate(hold, saved / "model.json", windowed=True)
     assert list(simulated.to_frame()["name"]) == ["hold-1"]
 
 
@@ -133,7 +128,6 @@ def test_what_is_no_answer_is_refused_with_what_to_do():
         rrrid.extend(rrrid.load(LOGS / "hold-1.h5"), **{"causes": "cogging:2"})
 
 
-def test_model_is_exported(model: rrrid.Answer, tmp_path: Path):
-    folder = model.save(tmp_path / "own")
-    exported = rrrid.export(folder / "model.json", to="json").save(tmp_path / "exported")
+def test_model_is_exported(saved: Path, tmp_path: Path):
+    exported = rrrid.export(saved / "model.json", to="json").save(tmp_path / "exported")
     assert any(path.suffix == ".json" and path.name != "result.json" for path in exported.iterdir())
