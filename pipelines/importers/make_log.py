@@ -39,7 +39,7 @@ from pipelines.io.robot import format_robot
 from pipelines.io.units import UNITS
 from pipelines.quality.checks import check_log
 from pipelines.quality.subject import many
-from pipelines.quality.units import TRUSTED, degrees_or_motor
+from pipelines.quality.units import DEGREES_OR_MOTOR, TRUSTED
 
 # (t, values, grid, method) -> values on the grid, and (begin, end, rate) -> the grid
 Resampling = tuple[Any, Any]
@@ -47,7 +47,7 @@ Resampling = tuple[Any, Any]
 _IN_RECIPE = {
     "RRID-S05": 'declare the unit of tau that its numbers are in, such as unit = "N mm", or '
     "correct the torque limits of the robot",
-    "RRID-S07": degrees_or_motor(np.inf, (-np.inf, np.inf)),
+    "RRID-S07": DEGREES_OR_MOTOR,
 }
 _SI = {"time": "s", "position": "rad", "velocity": "rad/s", "acceleration": "rad/s^2",
        "torque": "N m", "current": "A", "temperature": "degC"}  # fmt: skip

@@ -13,6 +13,11 @@ from pipelines.quality.motion import peak_speed
 from pipelines.quality.segments import torque_limit
 from pipelines.quality.subject import NotTested, Subject
 
+# S07's remedy in a recipe, for numbers that are degrees or of the motor
+DEGREES_OR_MOTOR = (
+    'if degrees, declare unit = "deg" (divides by 57.3); if motor side, add [drive] transmission = '
+    "the gear ratios, which multiplies torque by them as well; if neither, pass --trust-units"
+)
 TRUSTED = ("RRID-S05", "RRID-S07")  # not checked where the user vouches for the units
 
 
@@ -74,15 +79,6 @@ def degrees(s: Subject) -> Sequence[Check | NotTested]:
 
 def _written(signal: str, unit: str) -> str:
     return f'units = "{unit}" of /signals/{signal}, without the attribute digest of /'
-
-
-def degrees_or_motor(reach: float, bounds: tuple[float, float]) -> str:
-    """Return S07's remedy in a recipe, for numbers that are degrees or of the motor."""
-    wide = max(abs(bounds[0]), abs(bounds[1]), bounds[1] - bounds[0])
-    least = f" of at least {reach / wide:.3g}" if np.isfinite(wide) and wide > 0 else ""
-    remedy = 'if degrees, declare unit = "deg" (divides by 57.3); if motor side, add [drive] '
-    remedy += f"transmission = the gear ratios{least}, which multiplies torque by them as well; if "
-    return remedy + "neither, pass --trust-units"
 
 
 UNIT_CHECKS = (torque_unit, degrees)
