@@ -23,7 +23,6 @@ class Arrays:
     longest_name: int = 1000  # characters of a column's name
     longest_text: int = 1000  # characters that are kept of a text
     longest_unit: int = 20
-    largest_number: float = 1.7e308  # an integer may have hundreds of digits
     listed: int = 40  # columns that a message names
     widest: int = 64  # columns of a matrix: more joints than any arm
     clearly_longer: int = 4  # times the other side

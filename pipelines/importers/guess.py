@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -65,13 +65,16 @@ class Guess:
         return f"# {'' if self.sure else 'check: '}{clean(self.why, 300)}"
 
 
-def guess_recipe(path: Path, robot: str | None = None, model_of: object = None) -> Draft:
+def guess_recipe(
+    path: Path,
+    robot: str | None = None,
+    model_of: Callable[[RobotDescription], TorqueModel | None] = lambda robot: None,
+) -> Draft:
     """Return a commented recipe for the recording in `path`.
 
     Args:
         robot: description to use instead of that in the folder of the recording.
-        model_of: gives the torque of a robot's links by its description, None where they are not
-            known.
+        model_of: gives the torque of a robot's links, None where they are not known.
 
     Raises:
         InputRejected: the file cannot be read as a table of numbers.
@@ -80,7 +83,7 @@ def guess_recipe(path: Path, robot: str | None = None, model_of: object = None) 
     files, arm, problem = _robot_beside(path.parent, robot)
     joints = [joint.name for joint in arm.joints] if arm else []
     roles = choose(table, joints, bool(COMMANDED & set(words_of(path.stem))))
-    model = model_of(arm) if callable(model_of) and arm is not None else None
+    model = model_of(arm) if arm is not None else None
     units = _Units(table, roles, arm, model)
     evidence = {"time unit": units.time, "q unit": units.q, "tau unit": units.tau}
     name, columns = clean(path.name, 80), ", ".join(clean(c, 40) for c in table.columns)
@@ -91,7 +94,7 @@ def guess_recipe(path: Path, robot: str | None = None, model_of: object = None) 
         *(f"# the file says: {clean(note, 200)}" for note in table.notes[: GUESS.quoted]),
         f'# Go through every "check:" and fill in what says {BLANK}; then: '
         "rrrid import RECIPE.toml --source FOLDER",
-        *("", "[robot]", *_robot_lines(files, problem, robot is not None, len(joints))),
+        *("", "[robot]", *_robot_lines(files, problem, robot is not None)),
         *("", "[log]", f"match = {quoted(path.name)}      "
           '# a pattern such as "run_{number}.csv" takes many files'),
         'experiment = "free"                     '
@@ -248,8 +251,8 @@ class _Units:
         size = slope * angle.factor / step
         near = [u for u, f in _SPEEDS.items() if abs(size / f - 1.0) < GUESS.same_ratio]
         named = _own(group)
-        unit = named if named in near or not near or not named else ""
-        return Guess(unit or (near[0] if near and not named else ""), "the slope of the position")
+        unit = next((u for u in near if named in ("", u)), named if not near else "")
+        return Guess(unit, "the slope of the position")
 
 
 def _own(group: Group) -> str:
@@ -289,7 +292,7 @@ def _seconds(clock: Clock, unit: str) -> Array:
     return np.asarray((clock.values - clock.values[0]) * factor, dtype=np.float64)
 
 
-def _robot_lines(files: Sequence[str], problem: str, named: bool, joints: int) -> list[str]:
+def _robot_lines(files: Sequence[str], problem: str, named: bool) -> list[str]:
     if len(files) == 1:
         why = "as --robot says" if named else "check: likely, it lies in the same folder"
         lines = [f"use = {quoted(files[0])}   # {why}"]

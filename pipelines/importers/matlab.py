@@ -60,8 +60,7 @@ def read_mat5(data: bytes, source: str) -> dict[str, Any]:
         raise damaged_mat(source) from None
     if not set(names) <= loaded.keys():
         raise damaged_mat(source)
-    closed = {name: np.empty(0, object) for name, _, kind in listed if kind == "cell"}
-    return closed | {name: loaded[name] for name in names}
+    return {name: loaded[name] for name in names}
 
 
 def _wanted(listed: list[tuple[str, tuple[int, ...], str]], source: str) -> list[str]:
@@ -106,10 +105,6 @@ def read_hdf5(path: Path, source: str) -> dict[str, Any]:
                     found[name] = member  # an attribute
                 elif usable[name]:
                     found |= _arrays(name, member)
-                elif member.attrs.get("MATLAB_class") in (b"cell", "cell"):
-                    found[name] = np.empty(0, object)
-                elif member.dtype.kind in "fiub" and not _is_matrix(member):
-                    found[name] = np.empty((0, *member.shape[1:]))  # pictures, to name them
             return found
     except InputRejected:
         raise
@@ -155,25 +150,17 @@ def _is_usable(dataset: Any, name: str, source: str) -> bool:
     numbers = dataset.dtype.kind in "fiub" or dataset.dtype.names is not None
     plain = numbers and dataset.shape is not None and "MATLAB_empty" not in dataset.attrs
     closed = dataset.attrs.get("MATLAB_class", b"double") in _CLOSED
-    return bool(plain and not closed and dataset.shape and _is_matrix(dataset))
-
-
-def _is_matrix(dataset: Any) -> bool:
     sides = [side for side in dataset.shape or () if side > 1]
-    return not sides[2:]
+    return bool(plain and not closed and dataset.shape and not sides[2:])  # no pictures
 
 
 def _arrays(name: str, dataset: Any) -> dict[str, Anything]:
-    """Return the arrays of a data set: itself, fields of records, or a pandas frame's columns."""
+    """Return the arrays of a data set: itself, or the fields of its records."""
     values = np.asarray(dataset[()])
     if dataset.dtype.names is not None:
         return dict(_fields(name, values))
     # MATLAB stores by columns: what HDF5 calls (n, samples) is a (samples, n) matrix.
     values = values.T if "MATLAB_class" in dataset.attrs else values
-    stem = dataset.name.rpartition("/")[2].removesuffix("_values")
-    items = dataset.parent.get(f"{stem}_items")
-    if items is not None and values.ndim > 1 and items.shape == values.shape[1:]:
-        return dict(zip((label.decode() for label in items[()]), values.T, strict=True))
     unit = next((dataset.attrs[key] for key in ("unit", "units") if key in dataset.attrs), "")
     unit = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit
     said = isinstance(unit, str) and 0 < len(unit) <= ARRAYS.longest_unit

@@ -32,17 +32,13 @@ def too_large(declared: int, source: str, of: str = "") -> InputRejected:
     return InputRejected("X05", message, where=source, remedy="split the recording")
 
 
-def read_npy(data: bytes, source: str, objects: bool = False) -> dict[str, Anything]:
+def read_npy(data: bytes, source: str) -> dict[str, Anything]:
     """Return the fields of a structured array by name, or a plain array under the name "column".
-
-    An array of Python objects comes back empty where `objects` are let pass.
 
     Raises:
         InputRejected: F02 truncated, F08 damaged header, X05 too large, X07 pickled objects.
     """
     kind, by_columns, shape, start = _npy_header(data, source)
-    if kind.hasobject and objects:
-        return {"column": np.empty(0, object)}
     if kind.hasobject:
         message = "holds pickled Python objects, which are never opened"
         remedy = "save plain numbers: numpy.save(…, allow_pickle=False)"
@@ -107,7 +103,7 @@ def read_npz(data: bytes, source: str) -> dict[str, Anything]:
                 raise too_large(declared, source)
             for member in members:
                 name = member.filename.removesuffix(".npy")
-                fields = read_npy(archive.read(member), f"{source}, array {name}", objects=True)
+                fields = read_npy(archive.read(member), f"{source}, array {name}")
                 for field, array in fields.items():
                     found[name if field == "column" else f"{name}.{field}"] = array
     except _BAD_ARCHIVE:

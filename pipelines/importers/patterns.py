@@ -84,11 +84,6 @@ def matches(
     return list(found.about["found"])
 
 
-def match(patterns: Patterns, relative: str) -> dict[str, str] | None:
-    """Return the groups of the first pattern that fits the path, and {stem}; None otherwise."""
-    return _groups([_compiled(pattern) for pattern in each(patterns)], relative)
-
-
 def _groups(compiled: Sequence[re.Pattern[str]], relative: str) -> dict[str, str] | None:
     found = next((x for x in (one.fullmatch(relative) for one in compiled) if x), None)
     return {"stem": Path(relative).stem} | found.groupdict(default="") if found else None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -109,7 +110,8 @@ def test_c02_a_time_without_its_offset_is_refused(value: str) -> None:
     ("*.csv", "sub/run.csv", None),
 ])
 def test_patterns_give_their_groups(pattern: str, name: str, groups: dict[str, str] | None) -> None:
-    assert patterns.match(pattern, name) == groups
+    found = patterns.matches([pattern], [name], Path())
+    assert found == [{} if groups is None else {name: groups}]
 
 
 def test_the_docstring_shows_a_recipe_that_is_valid() -> None:
