@@ -90,6 +90,7 @@ def test_a_full_standard_error_leaves_the_error_object(tmp_path: Path) -> None:
     assert b"nowhere" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_killed_batch_leaves_no_temporary_folder(logs: Path) -> None:
     """Nor does one that comes to its end."""
     (temporary := logs / "tmp").mkdir()

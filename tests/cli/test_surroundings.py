@@ -31,7 +31,7 @@ def test_an_internal_error_is_exit_70_with_a_crash_file(logs: Path, monkeypatch:
 
 
 @pytest.mark.row("P06")
-@pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(("number", "exit_code"), [pytest.param(signal.SIGINT, 130, marks=pytest.mark.slow), (signal.SIGTERM, 143)])
 def test_a_signal_ends_cleanly(tmp_path: Path, number: signal.Signals, exit_code: int) -> None:
     """P06: Ctrl-C and SIGTERM end within 5 s with their code, no half-written folder, no orphan."""
     for i in range(30):

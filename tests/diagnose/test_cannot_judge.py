@@ -97,6 +97,7 @@ def test_logs_that_do_not_determine_the_model_cannot_be_judged() -> None:
     assert found.checks == ()  # nor the sign of viscous friction
 
 
+@pytest.mark.slow
 def test_a_joint_that_moves_one_way_alone_cannot_be_judged(shared: Path, tmp_path: Path) -> None:
     """Case 46: Coulomb friction of joints 2 and 6 is confounded with a torque offset there, which may be any fault."""
     case = shared / "cases" / "46-panda-tip-link-remedy"

@@ -29,6 +29,7 @@ def found() -> Diagnosis:
 
 @pytest.mark.parametrize("order", [10.7, 11.2])
 @pytest.mark.parametrize("amplitude", [0.001, 0.5])
+@pytest.mark.slow
 def test_a_fit_ends_at_the_same_numbers_wherever_it_starts(
     later: Later, order: float, amplitude: float
 ) -> None:

@@ -53,6 +53,7 @@ def warming(motion: Motion) -> Array:
     return out
 
 
+@pytest.mark.slow
 def test_a_joint_that_loses_most_of_its_viscous_friction_tells_how_much_and_how_fast() -> None:
     """Both numbers and the friction itself are unknown, and their product acts."""
     found = diagnosed(*logs(warming)[1:], exclude=but("viscous_drift", "quadratic_drag", "load_friction"))

@@ -150,6 +150,7 @@ def test_the_certificate_holds_for_random_motions() -> None:
             assert np.sqrt(values[-1] / values[0]) >= np.sqrt(1.5)
 
 
+@pytest.mark.slow
 def test_any_serial_arm() -> None:
     """Six axes with friction: better than random motions within the same limits, which hold by an arm of Pinocchio's kind."""
     task = _task(replace(Wishes(), criterion="condition", harmonics=(5,)), six_axes())

@@ -72,6 +72,7 @@ def test_the_model_is_refitted_and_simulates(rippled: tuple[Path, Outcome[extend
     assert off[0] < 0.5 * off[1]
 
 
+@pytest.mark.slow
 def test_a_model_keeps_its_effects(rippled: tuple[Path, Outcome[extend.Extension]], tmp_path: Path) -> None:
     """Extended by something that is not there, a model with cogging still has it, fitted anew."""
     folder, outcome = rippled
@@ -79,6 +80,7 @@ def test_a_model_keeps_its_effects(rippled: tuple[Path, Outcome[extend.Extension
     assert [(one.cause, one.joint) for one in again.findings] == [("cogging", 2)]
 
 
+@pytest.mark.slow
 def test_a_refused_extension_leaves_no_model_where_one_was(
         rippled: tuple[Path, Outcome[extend.Extension]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In the default folder: a result takes the place of the earlier one, and whoever asks it for a model gets none."""
