@@ -60,7 +60,6 @@ class Turned:
     left_out: float  # share of the samples
     filled: float  # share of the samples that were lost, and filled alike in all channels
     held: bool  # the input is held over a sample; False: sampled at some instant, as position is
-    torque_held: bool  # the same of the torque
 
     @property
     def rate(self) -> float:
@@ -160,7 +159,6 @@ def turned_joint(log: ExperimentLog) -> Turned:
         left_out=1.0 - sum(len(s.signals) for s in stretches) / len(signals),
         filled=filled,
         held=quantity == "r" or log.torque != "measured",
-        torque_held=log.torque != "measured",
     )
 
 

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.linalg import eigh
 
 from pipelines.frequency.grouping import (
-    Finding,
-    Open,
     explain,
     group_joint,
     predicted,
-    seen_elsewhere,
 )
 from pipelines.frequency.modes import Modes, Pair
 from pipelines.frequency.rational import Known, Mode, Rational
@@ -82,19 +77,6 @@ def test_neither_is_taken_for_the_other(seed: int) -> None:
     assert [one.kind for one in found] in ([], ["joint" if joint else "base"])
 
 
-def test_most_are_named() -> None:
-    """With an inertia that changes by a tenth or more, what is undecided is the exception."""
-    named = 0
-    for seed in range(40):
-        rng = np.random.default_rng([9, seed])
-        inertia = (1.0, float(rng.uniform(1.1, 1.3)))
-        motor, base = float(rng.uniform(0.05, 0.5)), float(rng.uniform(4.0, 30.0))
-        pairs = [two_masses(motor, j - motor, 20000.0) if seed % 2 else base_under_arm(28.0, base, j) for j in inertia]
-        found, left = group_joint(1, [modes_of([p], j) for p, j in zip(pairs, inertia, strict=True)], 1e-3)
-        named += len(found) == 1 and not left
-    assert named >= 38
-
-
 def test_numbers_come_back() -> None:
     """Stiffness and motor inertia of a joint, frequency and inertia of a base, and all four of both together."""
     inertia = (1.1, 1.3)
@@ -160,26 +142,3 @@ def test_delay_and_rigid() -> None:
     assert "drive_lag" in lag[0].candidates
     rigid, _ = group_joint(2, [modes_of([], 0.5)], 1e-3)
     assert [(one.kind, one.cause) for one in rigid] == [("rigid", None)]
-
-
-def test_modes_that_do_not_explain_are_not_believed() -> None:
-    """A fit that leaves far more than noise names nothing, however well its modes would suit a base."""
-    poor = [replace(modes_of([base_under_arm(28.0, 8.0, j)], j), misfit=30.0, scatter=0.1) for j in (1.0, 1.2)]
-    found, left = group_joint(1, poor, 1e-3)
-    assert found == []
-    assert "No linear plant explains" in left[0].evidence
-
-
-def test_the_base_is_known_again_at_other_joints() -> None:
-    """What joint 2 shows at the base's frequency is the base; what it shows elsewhere stays open."""
-    base = Finding("base", None, "", "base_resonance", Known(28.0, 0.01), Known(0.04, 1e-3), {}, (1,))
-    questions = [Open(2, Known(28.2, 0.1), ("base_resonance", "joint_elasticity"), "", ""),
-                 Open(3, Known(60.0, 0.1), ("base_resonance", "joint_elasticity"), "", "")]
-    sure, left = seen_elsewhere([base], questions)
-    assert sure[0].seen_at == (1, 2)
-    assert [one.joint for one in left] == [3]
-
-
-@pytest.mark.parametrize(("base", "joint"), [((1e200, 1.0), None), ((10.0, 1e-320), None), ((10.0, 1.0), (100.0, 1e-320))])
-def test_bodies_beyond_all_numbers_do_not_exist(base: tuple[float, float], joint: tuple[float, float] | None) -> None:
-    assert all(np.isnan(kind).all() for kind in predicted(1.0, base, joint))

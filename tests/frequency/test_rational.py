@@ -96,13 +96,6 @@ def test_a_resonance_without_its_antiresonance() -> None:
     assert mode.damping.value == pytest.approx(0.02, rel=0.05)
 
 
-def test_the_fit_says_what_its_response_is() -> None:
-    """`response` gives the truth back where it was not fitted."""
-    found = _fit(FREQUENCY[::2], _truth()[::2], (0.001 * np.abs(_truth()[::2])) ** 2)
-    np.testing.assert_allclose(found.response(FREQUENCY) * (2j * np.pi * FREQUENCY) ** -2, _truth(), rtol=1e-3)
-    assert _plateaus(found)[0].value == pytest.approx(0.8, rel=1e-3)
-
-
 def test_a_band_may_begin_between_an_antiresonance_and_its_resonance() -> None:
     """There the response is turned round: it is not of the other sign, and the resonance above is found."""
     f, w = np.arange(25.0, 325.0), 2.0 * np.pi * np.array([24.0, 40.0])
