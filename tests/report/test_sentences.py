@@ -15,7 +15,7 @@ STAGES = sorted(path.stem for path in (FOLDER / "templates").glob("*.jinja"))
 
 
 def test_text_from_a_log_is_no_template_and_keeps_its_signs() -> None:
-    said = sentence("friction", "curve", "{{ 7 * 7 }} % if", None, "N m", False, False)
+    said = sentence("friction", "curve", "{{ 7 * 7 }} % if", None, "N m", False)
     assert said.startswith("{{ 7 * 7 }} % if: the fitted law")
 
 
