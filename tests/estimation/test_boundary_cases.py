@@ -268,4 +268,4 @@ def test_the_card_tells_what_a_share_of_friction_is_a_share_of(shared: Path) -> 
     (card,) = boundary_card(boundary_of(shared / "real" / "panda" / "logs"))
     (words,) = (row for table in card.tables for row in table.rows if row[0].startswith("friction"))
     assert words[0] == "friction, share of the torque"
-    assert "no missing friction" in str(words[2])
+    assert "not missing friction" in str(words[2])
