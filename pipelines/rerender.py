@@ -67,14 +67,17 @@ def rerender(folder: Path, out: Path | None = None, force: bool = False) -> Repo
         refuse_foreign(home, force)
     report: Report = tilde(_report(stored))
     about = provenance_of(home)
-    outputs = about.get("outputs")
-    if not isinstance(outputs, dict) or any(
-        ".." in PurePath(name).parts or name.startswith("/") for name in outputs
-    ):  # X11
+    outputs, inputs, stage = (about.get(name, {}) for name in ("outputs", "inputs", "stage"))
+    known = isinstance(outputs, dict) and isinstance(inputs, dict) and "outputs" in about
+    if (
+        not known
+        or (is_batch and not isinstance(stage, str))
+        or any(".." in PurePath(name).parts or name.startswith("/") for name in outputs)  # X11
+    ):
         raise InputRejected("F05", "has no provenance.json that says what it is", home, _AGAIN)
-    footer = footer_of(stored.command, about.get("inputs", {}))
+    footer = footer_of(stored.command, inputs)
     if is_batch:
-        footer = {"command": "rrrid batch", "version": __version__, "stage": about["stage"]}
+        footer = {"command": "rrrid batch", "version": __version__, "stage": stage}
     with locked(home / "ledger", home) if is_batch else contextlib.nullcontext():
         drawn = _draw(report, out or home, footer)
         if out is None:

@@ -8,6 +8,7 @@ import os
 import re
 import signal
 import sys
+import traceback
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -56,7 +57,7 @@ def entry() -> NoReturn:
     except (Exception, Interrupted) as caught:
         _ignore_signals()
         if "--debug" in words:
-            raise
+            traceback.print_exc()
         # a library in whose call the signal came may have made another error of it
         error = Interrupted(heard[0]).as_error() if heard else _as_error(caught, words)
         code = error.exit_code

@@ -71,7 +71,7 @@ class Common:
     config: Path | None = option(None, "TOML file of settings, one table a stage.")
     set: tuple[str, ...] = option((), "One setting: STAGE.OPTION=VALUE; the names are below.")
     no_report: bool = option(False, "Leave report and figures out.")
-    force: bool = option(False, "Replace files that were changed as well, and keep none.")
+    force: bool = option(False, "Replace files that were changed as well.")
     quiet: bool = option(False, "Print nothing but errors.", "-q", "--quiet")
     verbose: bool = option(False, "Verbose progress.", "-v", "--verbose")
     debug: bool = option(False, "Show the traceback of an internal error.")

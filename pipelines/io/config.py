@@ -24,7 +24,8 @@ class TextConfig:
     """Bounds of a TOML text: its parser may need time and memory far beyond the length."""
 
     size: int = 1 << 20  # [B] a description with the URDF of a thousand links has 0.4 MB
-    parts: int = 6  # names in a dotted key; a configuration has two
+    parts: int = 64  # names in a row between dots; a key has two, a list of files a dozen
+    depth: int = 12  # of tables and lists within each other; a description of links has eight
 
 
 @dataclass(frozen=True)

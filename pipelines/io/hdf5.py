@@ -320,6 +320,5 @@ def _explain(problem: BaseException, path: Path) -> InputRejected:
         code, words = "F03", "not closed properly by the program that wrote it"
         remedy = "try 'h5clear -s FILE', or record again"
     elif isinstance(problem, MemoryError):
-        code, words = "X05", "needs more memory than a log may"
-        remedy = "split the recording"
+        raise problem
     return InputRejected(code, words, path, remedy)

@@ -43,7 +43,7 @@ _COUNT = 8  # numerics: [B] of the number that says how long a description is
 _AGAIN = "copy the file again"
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
 # a key of many parts, whose parsing takes time by the square of their number
-_LONG_KEY = re.compile(rf"(?m)^[ \t\[]*(?:[\w\"'-]+[ \t]*\.[ \t]*){{{TEXT.parts},}}")
+_LONG_KEY = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{TEXT.parts},}}")
 
 
 @dataclass(frozen=True)
@@ -117,9 +117,16 @@ def parse_toml(text: str) -> dict[str, Any]:
     if _LONG_KEY.search(text):
         raise TomlError(f"more than {TEXT.parts} parts of a key")
     try:
-        return tomllib.loads(text)
+        table = tomllib.loads(text)
     except (ValueError, RecursionError) as problem:
         raise TomlError(str(problem)) from None
+    level: list[Any] = [table]
+    for _ in range(TEXT.depth):
+        inner = (v.values() if isinstance(v, dict) else v for v in level)
+        level = [x for values in inner for x in values if isinstance(x, dict | list)]
+    if level:
+        raise TomlError(f"more than {TEXT.depth} tables and lists within each other")
+    return table
 
 
 def guarded(
@@ -212,8 +219,9 @@ def _replied(
     import numpy as np
 
     problem: RrridError
+    lower = False
     try:
-        _limit(seconds, memory)
+        lower = _limit(seconds, memory)
         answer = work()
         arrays = {k: np.ascontiguousarray(x, np.float64) for k, x in answer.arrays.items()}
         shapes = {name: values.shape for name, values in arrays.items()}
@@ -225,24 +233,29 @@ def _replied(
         problem = fault_of(fault, Path())
         problem.where = ""
     except MemoryError:
-        words, remedy = "needs more memory than it may", "split the recording, or raise --memory"
-        problem = InputRejected("X05", words, remedy=remedy)
+        problem = InputRejected("X05", "needs more memory than it may", "", "split the recording")
+        if lower:
+            words, remedy = "memory: it needs more than an item may", "raise --memory"
+            problem = EnvironmentFault("P03", words, remedy=f"{remedy}, or split the recording")
     except BaseException as fault:
         return {"internal": f"{type(fault).__name__}: {fault}"}, []
     return {"error": {"exit": problem.exit_code, **problem.as_dict()}}, []
 
 
-def _limit(seconds: float, memory: int) -> None:
-    """Limit time and memory of this process, never above what it has."""
+def _limit(seconds: float, memory: int) -> bool:
+    """Limit time and memory of this process; return whether its own limit of memory is lower."""
     import resource
 
     wanted = {resource.RLIMIT_CORE: 0, resource.RLIMIT_CPU: math.ceil(seconds) + 1}
     if sys.platform == "linux":
         pages = int(Path("/proc/self/statm").read_text().split()[0])
         wanted[resource.RLIMIT_AS] = pages * resource.getpagesize() + memory
+    lower = False
     for kind, value in wanted.items():
         hard = resource.getrlimit(kind)[1]
+        lower |= kind == resource.RLIMIT_AS and 0 <= hard < value
         resource.setrlimit(kind, (value if hard < 0 else min(value, hard), hard))
+    return lower
 
 
 def _received(reader: int, path: Path, longest: int, memory: int, seconds: float) -> Answer:

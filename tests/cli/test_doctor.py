@@ -26,6 +26,15 @@ def test_this_installation_works(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_simulation_that_fails_is_a_finding(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """`rrrid doctor` goes on with the other jobs and ends in 6."""
+    monkeypatch.setattr("pipelines.simulation.example.example_session", lambda: 1 / 0)
+    done = rrrid("doctor", "--json", cwd=tmp_path)
+    told = {one["name"]: one["level"] for one in json.loads(done.stdout)["findings"]}
+    assert done.returncode == 6
+    assert (told["self-test: simulating a log"], told["self-test: observer"]) == ("bad", "ok")
+
+
 def test_a_library_that_is_missing_or_too_old(monkeypatch: pytest.MonkeyPatch) -> None:
     """numpy 1.9 is not 1.26; h5py is not there; an extra that is not there is no fault."""
     version = importlib.metadata.version

@@ -25,6 +25,8 @@ _NUMBERS = ",".join(["0.25"] * 80_000)
 
 HOSTILE: dict[str, tuple[str, str]] = {
     "dotted key": ("robot", "a." * 50_000 + "a = 1"),
+    "dotted key in a table": ("robot", "x = {" + "a." * 3_000 + "a = 1}"),
+    "dotted keys within each other": ("recipe", "x = " + "{a.a.a.a.a.a.a.a = " * 60 + "1" + "}" * 60),
     "many deep tables": ("recipe", "".join(f"[a{k}.b.c.d.e.f]\n" for k in range(300_000))),
     "deep array": ("settings", "a = " + "[" * 100_000),
     "wide inline table": ("recipe", "a = {" + ",".join(f"a{k} = 1" for k in range(300_000)) + "}"),
@@ -36,7 +38,6 @@ HOSTILE: dict[str, tuple[str, str]] = {
         f'<link name="l{k}"/><joint name="j{k}" type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/></joint>'
         for k in range(5000)) + '<link name="l5000"/></robot>'),
 }
-
 
 
 @pytest.fixture(scope="module")
