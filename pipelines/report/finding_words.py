@@ -53,9 +53,12 @@ def _line(one: Finding, found: Result) -> str:
     size, p = how_much(one), _probability(one.probability)
     what = f"{one.title}{where(one, found.joints)}{f': {size}' if size else ''}{p}"
     if one.alternatives:
-        others = [_alternative(one, other, found.joints) for other in one.alternatives]
-        words = f"{what}, or {', or '.join(others)}: these logs do not separate them."
-        return f"{words} {as_sentence(one.experiment or '')}".strip()
+        first, *more = one.alternatives
+        others = f"or {_alternative(one, first, found.joints)}"
+        others = f"{others}, or {len(more)} more" if more else others
+        words = f"{what}, {others}: these logs do not separate them."
+        whole = f"{words} {as_sentence(one.experiment or '')}".strip()
+        return whole if len(whole) <= REPORT.headline else words
     gain = f"; {_gain(one, found)}, {100.0 * one.explained:.0f} % of the excess residual."
     action = as_sentence(find_effect(one.cause).words.remedy.split(";")[0])
     line = f"{what}{gain} {action}"

@@ -30,7 +30,6 @@ class Step:
 
     per_sample: int
     error: Array  # [rad] rms, largest of the stretches, measured by halving
-    allowed: Array  # [rad]
     exact: bool  # the rigid body is nowhere held
 
 
@@ -80,7 +79,7 @@ def choose_step(plant: Plant, experiment: Experiment, noise: Noise | None = None
             rough = coarse if exact else None
             error = _rms(rough or _positions(plant, calm, steps, exact), fine)
             if (error <= allowed).all():
-                return Step(steps, error, allowed, exact)
+                return Step(steps, error, exact)
         coarse = fine
     words = f"with {steps} steps a sample the simulation still is {error.max():.2g} rad off"
     remedy = "friction that changes sign within a very small speed needs a lower sharpness"

@@ -94,12 +94,6 @@ class WritingTask:
     def duration(self) -> float:  # [s]
         return self.law.duration + 2.0 * self.rest
 
-    def passings(self, kind: str) -> Array:
-        """Return when [s] the tip passes a "corner", at rest, or a "bend" of the path."""
-        ends = np.searchsorted(self.law.piece, np.arange(len(self.path.joints)), side="right")
-        chosen = np.array([joint == kind for joint in self.path.joints], dtype=bool)
-        return np.asarray(self.rest + self.law.start[ends][chosen])
-
     def tip(self, t: Array) -> TipMotion:
         """Return the tip at times t (samples,) [s].
 
