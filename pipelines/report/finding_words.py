@@ -87,7 +87,7 @@ def _probability(p: float | None) -> str:
 
 def _alternative(first: Finding, other: Alternative, names: Sequence[str]) -> str:
     like = replace(first, cause=other.cause, joint=other.joint, log=None)
-    like = replace(like, parameters=other.parameters)
+    like = replace(like, parameters=other.parameters, torque_rms=np.nan)
     size, p = how_much(like), _probability(other.probability)
     title = within(find_effect(other.cause).words.title)
     return f"{title}{where(like, names)}{f': {size}' if size else ''}{p}"
