@@ -16,7 +16,14 @@ from pipelines.dynamics.arm import Arm
 from pipelines.errors import InputRejected, RrridError
 from pipelines.frequency.config import GroupingConfig, ReportConfig, SignConfig
 from pipelines.frequency.grouping import Finding, Open, group_joint, seen_elsewhere
-from pipelines.frequency.modes import BAND, Modes, fitted_modes, informative, relative_acceleration
+from pipelines.frequency.modes import (
+    BAND,
+    Modes,
+    fitted_modes,
+    informative,
+    relative_acceleration,
+    with_enough_bins,
+)
 from pipelines.frequency.responses import Measured, measured_responses
 from pipelines.frequency.signals import Turned
 from pipelines.frequency.spectra import inside
@@ -79,7 +86,8 @@ def frf_findings(
             D04, D09; S14, a joint that accelerates against its input.
     """
     seen, unusable = [], []
-    for measured in measured_responses(logs):
+    for one in measured_responses(logs):
+        measured = with_enough_bins(one, band)
         _check_sign(measured)
         if informative(measured, band):
             modes = fitted_modes(measured, band)

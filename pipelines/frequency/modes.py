@@ -21,7 +21,15 @@ from pipelines.frequency.rational import FEWEST, Known, Mode, Rational, fit_rati
 from pipelines.frequency.responses import Measured
 from pipelines.frequency.spectra import Array, Complex, FrequencyResponse, inside
 
-__all__ = ["BAND", "Modes", "Pair", "fitted_modes", "informative", "relative_acceleration"]
+__all__ = [
+    "BAND",
+    "Modes",
+    "Pair",
+    "fitted_modes",
+    "informative",
+    "relative_acceleration",
+    "with_enough_bins",
+]
 
 _CONFIG = ModesConfig()
 BAND = _CONFIG.band  # numerics: [Hz] in which modes are looked for
@@ -71,6 +79,14 @@ def informative(measured: Measured, band: tuple[float, float] = BAND) -> bool:
     """Return whether enough of `band` [Hz] is excited for a fit, and nothing has folded into it."""
     count = len(_in_band(measured, measured.plant, band).frequency)
     return not measured.aliased and count >= FEWEST
+
+
+def with_enough_bins(measured: Measured, band: tuple[float, float] = BAND) -> Measured:
+    """Return `measured` without the response `held` where that has too few bins for a fit."""
+    held = measured.held
+    if held is None or len(_in_band(measured, held, band).frequency) >= FEWEST:
+        return measured
+    return replace(measured, held=None)
 
 
 def _in_band(

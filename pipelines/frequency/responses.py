@@ -215,6 +215,17 @@ def _torque_per_input(
     return float(ratio[order][min(middle, len(order) - 1)])
 
 
+def _stands_as(one: Turned, other: Turned) -> bool:
+    """Return whether all joints stand alike; `other` holds that which `one` turns in its stroke.
+
+    The joint that `other` turns is not compared: that is for the call the other way round.
+    """
+    tolerance, (low, high) = _CONFIG.same_posture, one.stroke
+    apart = np.delete(other.posture - one.posture, [one.joint - 1, other.joint - 1])
+    near = bool(np.abs(apart).max(initial=0.0) < tolerance)
+    return near and low - tolerance < other.posture[one.joint - 1] < high + tolerance
+
+
 def _others_held(one: Measured, every: Sequence[Measured]) -> FrequencyResponse | None:
     """Return τ_j → q_j with the other joints held, from the experiments on all joints.
 
@@ -225,11 +236,16 @@ def _others_held(one: Measured, every: Sequence[Measured]) -> FrequencyResponse 
     same = [
         other
         for other in every
-        if other.first.quantity == first.quantity == "tau"
-        and np.abs(other.first.posture - first.posture).max() < _CONFIG.same_posture
-        and other.several.resolution == one.several.resolution
+        if other is one
+        or (
+            other.joint != one.joint
+            and other.several.resolution == one.several.resolution
+            and _stands_as(first, other.first)
+            and _stands_as(other.first, first)
+        )
     ]
-    if n == 1 or [other.joint for other in same] != list(range(1, n + 1)):
+    quantities = {other.first.quantity for other in same}
+    if n == 1 or quantities != {"tau"} or [o.joint for o in same] != list(range(1, n + 1)):
         return None
     f = reduce(np.intersect1d, [other.several.frequency for other in same])
     several = [other.several.where(np.isin(other.several.frequency, f)) for other in same]

@@ -48,7 +48,8 @@ class Turned:
 
     name: str
     joint: int  # 1-based
-    posture: Array  # (n,) [rad]; the joint's own angle is where it began
+    posture: Array  # (n,) [rad]; the joint's own angle is where it began, unless the log says
+    stroke: tuple[float, float]  # [rad] between which the joint turns, with its angle in `posture`
     sample_time: float  # [s]
     quantity: str  # "r" [rad/s^2] under computed torque, "tau" [N m] under PD: the plant's input
     controller: Controller | None
@@ -144,10 +145,13 @@ def turned_joint(log: ExperimentLog) -> Turned:
         size = np.abs(np.fft.rfft(np.nan_to_num(recorded_v[:period])))
         lines = tuple(np.flatnonzero(size > _CONFIG.line * size.max()).tolist())
     top = float(np.nanmax(np.abs(speed)))
+    posture = np.asarray(mended["q_ref"][0] if log.posture is None else log.posture)
+    turn = np.append(mended["q_ref"][:, j], posture[j])
     return Turned(
         name=log.name,
         joint=joint,
-        posture=np.asarray(mended["q_ref"][0] if log.posture is None else log.posture),
+        posture=posture,
+        stroke=(float(np.nanmin(turn)), float(np.nanmax(turn))),
         sample_time=log.sample_time,
         quantity=quantity,
         controller=log.controller,

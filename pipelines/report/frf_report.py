@@ -244,9 +244,13 @@ def _recorded(measured: Measured) -> Section:
         m, posture = own["closed-loop"], posture_words(p.posture, p.joint)
         lost = (100.0 * p.left_out, 100.0 * p.filled)
         where = (p.joint, number)
-        motion.append((*where, posture, ", ".join(p.logs), p.controller, p.speed, p.swing, *lost))
+        others = ""
+        if p.input == "tau" and len(p.posture) > 1:
+            others = "superposed to rest" if p.others_held else "swing, not superposed"
+        how = (", ".join(p.logs), p.controller, others, p.speed, p.swing)
+        motion.append((*where, posture, *how, *lost))
         spectra.append((*where, _bands(p.excited), m.resolution, m.averages))
-    settings = ("logs", "controller", "speed [rad/s]", "its std [rad/s]")
+    settings = ("logs", "controller", "other joints", "speed [rad/s]", "its std [rad/s]")
     motion_columns = ("joint", "no.", "posture", *settings, "left out [%]", "lost, filled [%]")
     spectra_columns = ("joint", "no.", "excited band [Hz]", "resolution [Hz]", "averages")
     tables = (Table(motion_columns, tuple(motion)), Table(spectra_columns, tuple(spectra)))

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pipelines.frequency.findings import Findings, frf_findings
+from pipelines.frequency.modes import fitted_modes, informative, with_enough_bins
 from pipelines.frequency.responses import measured_responses
 from pipelines.frequency.result import posture_of
 from pipelines.frequency.spectra import inside
@@ -79,6 +81,34 @@ def test_a_soft_base_under_pd(shared: Path) -> None:
     assert {one.kind for one in others} <= {"rigid"}
     assert base.parameters["frequency"].value == pytest.approx(truth["frequency"], rel=0.03)
     assert base.parameters["inertia"].value == pytest.approx(truth["inertia"], rel=0.15)
+
+
+def test_experiments_that_start_within_their_stroke_are_superposed(shared: Path) -> None:
+    """Without a stated posture each log begins where its joint is by then: what the others hold is the same posture."""
+    logs = [open_log(shared / "plant-b" / "arm-06" / f"frf-{k}.h5").log for k in range(1, 5)]
+    whole = [one.held is not None for one in measured_responses(logs)]
+    later = [replace(log, posture=None, signals={
+        name: replace(signal, values=signal.values[log.n_samples // 10:]) for name, signal in log.signals.items()})
+        for log in logs]
+    found = measured_responses(later)
+    own = [one.first.posture[one.joint - 1] for one in found]
+    held = [other.first.posture[one.joint - 1] for one, other in zip(found, found[1:] + found[:1], strict=True)]
+    assert any(whole)
+    assert np.abs(np.subtract(own, held)).max() > 0.05
+    assert [one.held is not None for one in found] == whole
+
+
+def test_too_few_superposed_bins_leave_the_plant(shared: Path) -> None:
+    """Of 17 bins no mode is fitted: the response of the joint alone is."""
+    logs = [open_log(shared / "plant-b" / "arm-06" / f"frf-{k}.h5").log for k in range(1, 7)]
+    measured = next(one for one in measured_responses(logs) if one.held is not None)
+    assert with_enough_bins(measured) is measured
+    assert measured.held is not None
+    few = replace(measured, held=measured.held.where(np.arange(len(measured.held.frequency)) < 17))
+    plain = with_enough_bins(few)
+    assert plain.held is None
+    assert informative(plain)
+    assert fitted_modes(plain).relative.frequency.size == plain.plant.frequency.size
 
 
 def test_a_spring_in_a_joint_under_pd(shared: Path) -> None:
