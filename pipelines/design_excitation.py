@@ -20,7 +20,7 @@ from pipelines.dynamics.named_cause import wanted_cause
 from pipelines.errors import UsageError
 from pipelines.excitation.discrimination import Pair, best, refuse_hidden, refuse_one
 from pipelines.excitation.optimise import Effort
-from pipelines.excitation.other_plans import frf_plans, friction_plans, hold_plans
+from pipelines.excitation.other_plans import frf_plans, friction_plans
 from pipelines.excitation.result import Result, doubts, information_of, judged, planned
 from pipelines.excitation.result import log_of as planned_log_of
 from pipelines.excitation.task import Wishes, plan_task
@@ -40,7 +40,7 @@ from pipelines.stage import Inputs, Request, Stage, read_logs, slug
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
-PURPOSES = ("excitation", "friction", "frf", "hold")
+PURPOSES = ("excitation", "friction", "frf")
 APART_HARMONICS = (20,)  # numerics: a search without gradients wants fewer
 USED = ("excitation", "free")  # experiments whose information is added
 
@@ -51,7 +51,7 @@ class Settings(Wishes):
 
     robot: str | None = option(
         None, "Description, URDF, log or shipped name. [robot.toml here, else rrr]", "ROBOT")
-    experiment: str = option("excitation", "excitation, friction, frf or hold.")
+    experiment: str = option("excitation", "excitation, friction or frf.")
     time_limit: float = option(30.0, "Time to search, in seconds of computing.")
     evaluations: int | None = option(
         None, "Search so many evaluations instead: repeatable exactly.")
@@ -178,10 +178,8 @@ def _plans(given: Material, settings: Settings, wishes: Wishes) -> Result:
     task, seed = plan_task(given.robot, given.arm, wishes), settings.seed
     if settings.experiment == "friction":
         plans = friction_plans(task)
-    elif settings.experiment == "frf":
-        plans = frf_plans(task, seed)
     else:
-        plans = hold_plans(task, seed)
+        plans = frf_plans(task, seed)
     return replace(planned(task, settings.experiment, seed, plans), robot_from=given.why)
 
 

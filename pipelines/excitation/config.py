@@ -73,12 +73,8 @@ class ExcitationConfig:
     frf_period: float = 8.0  # [s] odd lines then lie a quarter of a hertz apart
     frf_periods: int = 2  # each way at least, to tell noise
     frf_settle: float = 1.0  # [s] before them, in which the loop settles
-    realisations: int = 2  # of other phases, to tell nonlinear distortion from noise
+    realisations: int = 2  # of other phases, on whose mean nonlinear distortion is smaller
     frf_band: tuple[float, float] = (1.0, 0.4)  # [Hz] lowest line; highest, of the sample rate
-    group: int = 4  # odd lines of which one is left out (Schoukens et al. 2005, Automatica 41)
-    postures: int = 8
-    candidates: int = 400
-    dwell: float = 2.0  # [s]
     slower: float = 0.8  # a plan that breaks a limit is made slower in such steps
     slowest: float = 0.05
     # figures

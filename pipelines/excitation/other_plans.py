@@ -2,16 +2,16 @@
 
     friction    one joint at speeds over two decades, both ways, each held as its range allows
     frf         one joint turning slowly there and back, with an odd random-phase multisine, twice
-    hold        static postures that together determine gravity best
 
-The multisine has odd lines of which one in four is missing, to tell even and odd powers from noise
-(Pintelon, Schoukens 2012, System Identification, §4.3.1; Schoukens et al. 2005, Automatica 41).
+The multisine has odd lines alone, the same ones for every joint: what even powers distort falls
+between them (Pintelon, Schoukens 2012, System Identification, §4.3.1), and the experiments of all
+joints can be superposed.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -21,12 +21,11 @@ import numpy.typing as npt
 from pipelines.dynamics.body import Array
 from pipelines.errors import UsageError
 from pipelines.excitation.config import CONFIG
-from pipelines.excitation.constraints import tip_motion
 from pipelines.excitation.fourier import quintics
 from pipelines.excitation.task import Task
 from pipelines.excitation.verify import Peak, torque_of, worst
 
-__all__ = ["Plan", "frf_plans", "friction_plans", "hold_plans", "odd_lines", "realisation"]
+__all__ = ["Plan", "frf_plans", "friction_plans", "realisation"]
 
 QUINTIC_SPEED, QUINTIC_ACCELERATION = 1.875, 5.774  # numerics: peaks of 10 s³ - 15 s⁴ + 6 s⁵
 RAMP = 1.5  # numerics: largest slope of 3 s² - 2 s³
@@ -209,10 +208,9 @@ def _frf(task: Task, j: int, home: Array, seed: int, share: float) -> tuple[Plan
         strength = CONFIG.frf_torque * _acceleration(task, j, home) / CONFIG.acceleration
     seconds, (low, high) = CONFIG.frf_period, CONFIG.frf_band
     period, found = round(seconds / task.sample_time), []
-    lines = odd_lines(np.random.default_rng([seed, j]), int(low * seconds), int(high * period))
+    lines = np.arange(int(low * seconds) | 1, int(high * period) + 1, 2)
     words = (f"{len(lines)} odd lines from {lines[0] / seconds:.3g} to "
-             f"{lines[-1] / seconds:.4g} Hz, one of four left out to detect distortion, repeated "
-             f"every {seconds:g} s")
+             f"{lines[-1] / seconds:.4g} Hz, repeated every {seconds:g} s")
     for k in range(CONFIG.realisations):
         own = realisation(np.random.default_rng([seed, j, k]), lines, period, len(t))
         v = np.zeros((len(t), task.robot.n_joints))
@@ -224,65 +222,10 @@ def _frf(task: Task, j: int, home: Array, seed: int, share: float) -> tuple[Plan
     return tuple(found)
 
 
-def odd_lines(rng: np.random.Generator, lowest: int, highest: int) -> npt.NDArray[np.int64]:
-    """Return odd harmonics from `lowest` to `highest`, without one of every four neighbours."""
-    odd = np.arange(lowest | 1, highest + 1, 2)
-    groups = len(odd) // CONFIG.group
-    out = CONFIG.group * np.arange(groups) + rng.integers(CONFIG.group, size=groups)
-    return np.asarray(np.delete(odd, out), dtype=np.int64)
-
-
-def realisation(rng: np.random.Generator, lines: Sequence[int] | npt.NDArray[np.int64],
+def realisation(rng: np.random.Generator, lines: npt.NDArray[np.int64],
                 period: int, samples: int) -> Array:
     """Return lines of equal amplitude and random phase, rms 1, repeated after `period` samples."""
     spectrum = np.zeros(period // 2 + 1, dtype=np.complex128)
     spectrum[lines] = np.exp(2j * np.pi * rng.uniform(size=len(lines)))
     one = np.fft.irfft(spectrum, period)
     return np.asarray(np.resize(one / np.sqrt(np.mean(one**2)), samples))
-
-
-def hold_plans(task: Task, seed: int) -> tuple[Plan, ...]:
-    """Plan postures, each the one that adds most to log det of the information on gravity."""
-    rng, n = np.random.default_rng(seed), task.robot.n_joints
-    low, high = task.around
-    wide = 0.5 * (high - low)
-    candidates = rng.uniform(low - wide, high + wide, (CONFIG.candidates, n))
-    bounds = np.array([joint.position for joint in task.robot.joints])
-    candidates = np.clip(candidates, bounds[:, 0] + 0.02, bounds[:, 1] - 0.02)
-    rows, kept = _static_rows(task, candidates)
-    if not kept.any():
-        raise UsageError("C08", "no posture can be held within the limits of torque and tip",
-                         where=task.robot.name, remedy="correct these limits or the model")
-    rows, candidates = rows[kept], candidates[kept]
-    matrix, plans = 1e-6 * np.eye(rows.shape[2]), []
-    t = np.arange(round(CONFIG.dwell / task.sample_time) + 1, dtype=np.float64) * task.sample_time
-    for k in range(min(CONFIG.postures, len(candidates))):
-        gain = np.linalg.slogdet(np.eye(n) + rows @ np.linalg.solve(matrix, rows.swapaxes(1, 2)))[1]
-        best = int(np.argmax(gain))
-        matrix += rows[best].T @ rows[best]
-        motion = np.zeros((3, n, len(t)))
-        motion[0] = candidates[best][:, None]
-        words = ", ".join(f"{value:.3f}" for value in candidates[best]) + " rad"
-        plan = Plan(f"hold-{k + 1}", "hold", None, candidates[best], t, motion, words=words)
-        plans.append(replace(plan, nearest=_nearest(task, plan)))
-    return tuple(plans)
-
-
-def _static_rows(task: Task, q: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """Return rows (postures, joints, columns) over the noise, and which postures can be held."""
-    problem, still = task.problem, np.zeros((3, q.shape[1], len(q)))
-    still[0] = q.T
-    rows = np.zeros((len(q), q.shape[1], len(problem.columns.names)))
-    own_rows = [row.copy() for row in problem.columns.rows(still)]
-    for j, (own, row) in enumerate(zip(problem.columns.columns, own_rows, strict=True)):
-        rows[:, j, own] = row.T / problem.goal.noise[j]
-    kept = np.ones(len(q), dtype=bool)
-    tip = tip_motion(problem.chain, still[0], still[1]).position
-    tau = None if problem.beta is None else problem.torque(own_rows, still[1])
-    for one in problem.limits:
-        if one.quantity == "torque" and one.joint and tau is not None:
-            kept &= np.abs(tau[one.joint - 1]) < one.high
-        elif one.quantity[:-1] == "tip ":
-            place = tip["xyz".index(one.quantity[-1])]
-            kept &= (place > one.low) & (place < one.high)
-    return rows, kept

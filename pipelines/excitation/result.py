@@ -97,7 +97,6 @@ class Result:
     run_in: float = 0.0  # [s]
     home: tuple[float, ...] | None = None  # [rad]
     noise: tuple[float, ...] = ()  # [N m]
-    friction_columns: bool = False
     torque_checked: bool = False
     torque_share: float = 1.0
     speed_share: float = 1.0  # of the speed limit that the plan may use
@@ -164,8 +163,8 @@ def judged(task: Task, design: Design, apart: Apart | None, seed: int) -> Result
         course=Course(t, q, dq, ddq, tau),
         period=series.period, periods=trajectory.periods, run_in=trajectory.run_in,
         duration=trajectory.duration, noise=tuple(map(float, goal.noise)),
-        friction_columns=columns.friction, top_hz=float(used[-1] + 1) / series.period,
-        apart=apart, coefficients=coefficients(task, trajectory))
+        top_hz=float(used[-1] + 1) / series.period, apart=apart,
+        coefficients=coefficients(task, trajectory))
 
 
 def doubts(result: Result) -> tuple[Check, ...]:

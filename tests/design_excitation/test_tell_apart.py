@@ -56,7 +56,7 @@ def test_limits_and_ceiling_are_kept(both: dict[str, Outcome[Result]]) -> None:
 
 @pytest.mark.parametrize(("causes", "more", "words"), [
     (("spring:2",), {}, "two causes"), (("spring:2", "cogs:2"), {}, "cogging"),
-    (("spring:2", "torque_offset:2"), {"experiment": "hold"}, "excitation"),
+    (("spring:2", "torque_offset:2"), {"experiment": "friction"}, "excitation"),
     (("spring:2", "spring:2"), {}, "spring:2 and spring:2 are one cause")])
 def test_what_cannot_be_told_apart_is_refused(causes: tuple[str, ...], more: dict[str, object], words: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError) as refused:

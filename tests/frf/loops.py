@@ -44,7 +44,7 @@ class Loop:
     seconds: float = 40.0
     period: int | None = 2000  # [samples] of v; None: random
     encoder: float = 1e-6  # [rad]
-    odd: bool = False  # v has odd lines alone, and not every one: the others detect distortion
+    odd: bool = False  # v has odd lines alone, and not every one
     late: int = 0  # samples by which the measured position is late
     seed: int = 1
 
