@@ -130,8 +130,9 @@ def drift_in_words(joint: JointResult) -> str:
     time, middle = plain_number(drift.when), plain_number(drift.holds_at)
     if drift.kind == "step":
         return f"{start} at once, {time} s into {drift.log}; the law is that before."
+    doubt = "" if drift.when_std is None else f" ± {plain_number(drift.when_std)}"
     return (f"{start} of its value at {middle} s in the course of each log, with a time constant "
-            f"of {time} s; the law holds at {middle} s.")
+            f"of {time}{doubt} s; the law holds at {middle} s.")
 
 
 def misfits(joints: Sequence[JointResult], where: str) -> list[Check]:

@@ -73,6 +73,7 @@ class Drift:
     speed: float  # [rad/s] at which
     holds_at: float  # [s] since the start of a log, when friction is the law; of a step, before it
     log: str
+    when_std: float | None = None  # [s] of a time constant
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,8 @@ class Series:
     speed: Array  # [rad/s] (points,) of the curve
     curve: Array  # [N m]
     band: Array  # [N m] one standard deviation
-    t: Array  # [s] (samples,) of the judged log, thinned out
+    # (samples,) of the judged log, thinned out; empty where nothing was simulated
+    t: Array  # [s]
     torque: Array  # [N m]
     friction: Array  # simulated
     gravity: Array
@@ -191,7 +193,8 @@ def _drift(joint: JointFit) -> Drift | None:
         return None
     name = joint.stretches[course.part].name
     size = Value(change, std, "1")
-    return Drift(course.kind, course.form, course.time, size, speed, course.holds, name)
+    return Drift(course.kind, course.form, course.time, size, speed, course.holds, name,
+                 course.time_std)
 
 
 def _sticking(joint: JointFit) -> Sticking | None:
@@ -225,11 +228,13 @@ def _curve(fit: LawFit, fastest: float) -> tuple[Array, Array, Array]:
 def _series(joint: JointFit) -> Series:
     driven, stretch = joint.driven, joint.driven.stretch
     every = max(1, len(stretch.t) // POINTS)
-    samples = (stretch.t - stretch.t[0], stretch.tau, *fractions(joint), stretch.q, stretch.dq,
-               driven.with_friction.q, driven.with_friction.dq, driven.without.q,
-               driven.without.dq)
+    friction, gravity, inertial = fractions(joint)
+    samples = {"t": stretch.t - stretch.t[0], "torque": stretch.tau, "friction": friction,
+               "gravity": gravity, "inertial": inertial, "q": stretch.q, "dq": stretch.dq,
+               "q_with": driven.with_friction.q, "dq_with": driven.with_friction.dq,
+               "q_without": driven.without.q, "dq_without": driven.without.dq}
     return Series(*_curve(joint.fit, joint.covered.fastest),
-                  *(np.asarray(x[::every]) for x in samples))
+                  **{name: np.asarray(x[::every]) for name, x in samples.items()})
 
 
 def several_results(found: SeveralFit, arm: Arm, validate: Motions) -> tuple[JointResult, ...]:
@@ -260,7 +265,7 @@ def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array,
     numbers = {key if several else key.partition(".")[2]: Value(p.value, std.get(key), p.unit)
                for key, p in known.items() if key.partition(".")[0] in law.members}
     fastest, slowest = float(speed.max()), float(np.quantile(speed, 0.02))
-    inertia = _inertia(found.fitted, arm, j, middle)
+    inertia, none = _inertia(found.fitted, arm, j, middle), np.zeros(0)  # nothing was simulated
     missing: tuple[Missing, ...] = (_UNMOVED,)
     if moves:
         missing = undecided(ladder, slowest, fastest)
@@ -269,7 +274,9 @@ def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array,
         (Posture(tuple(map(float, middle)), inertia, {}),),
         Validation(None, None, "", False, _torque_error(ladder)), _candidates(ladder), ladder.by,
         missing, (slowest, fastest), names,
-        Series(*_curve(fit, fastest), *(np.zeros(0),) * 11), moves)
+        Series(*_curve(fit, fastest), t=none, torque=none, friction=none, gravity=none,
+               inertial=none, q=none, dq=none, q_with=none, dq_with=none, q_without=none,
+               dq_without=none), moves)
 
 
 def _inertia(fitted: Fitted, arm: Arm, j: int, q: Array) -> Value:

@@ -23,7 +23,7 @@ draws of their signs (estimation/bootstrap.py).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +43,7 @@ __all__ = ["Sliding", "drift_of", "left_out", "sliding_rows"]
 RANK = 1e-7  # numerics: singular values of unit columns below it: two columns that are one
 ALIKE = 1e-9  # numerics: relative, of sums of squares over all rows
 FINE = 1e-2  # numerics: of the logarithm of a time constant
+NEAR = 1e-4  # numerics: relative step of a derivative by a time constant
 
 
 _CONFIG, _DRIFT = SlidingConfig(), DriftConfig()
@@ -219,10 +220,14 @@ class _Rows:
         return np.concatenate([course.at(part, stretch.middle[2] - stretch.t[0])
                                for part, stretch in enumerate(self.stretches)])
 
+    def rest(self, fit: Linear) -> Array:
+        """Return the residual of every block as the other blocks predict it (rows,)."""
+        return held_out(fit.columns @ fit.root, fit.residual, self.blocks)
+
     def held_out(self, fit: Linear) -> Array:
-        """Return Σ r² of every block as the other blocks predict it (blocks,)."""
-        rest = held_out(fit.columns @ fit.root, fit.residual, self.blocks)
-        return np.asarray(np.maximum(np.bincount(self.blocks, np.square(rest)), 1e-300))
+        """Return Σ r² of that of every block (blocks,)."""
+        squares = np.bincount(self.blocks, np.square(self.rest(fit)))
+        return np.asarray(np.maximum(squares, 1e-300))
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,12 +236,12 @@ class _Drift:
 
     course: Course
     fit: Linear  # the last column is c(t) g(v)
-    typical: float  # [N m] median of |g(v)|
+    shape: Array  # (rows,) g(v)
 
     @property
     def size(self) -> float:
         """Return by how much it changes friction [N m]."""
-        return abs(float(self.fit.beta[-1])) * self.typical
+        return abs(float(self.fit.beta[-1])) * float(np.median(np.abs(self.shape)))
 
 
 def drift_of(stretches: Sequence[Stretch], joint: OneJoint) -> Course | None:
@@ -265,8 +270,9 @@ def drift_of(stretches: Sequence[Stretch], joint: OneJoint) -> Course | None:
     whole = curve @ best.fit.beta[-1 - curve.shape[1]:-1]
     least = _DRIFT.least * float(np.median(np.abs(whole)))
     if best.size >= least and by_flips(gains) <= _DRIFT.chance:
-        return next(drift.course for drift in drifts
-                    if no_worse(drift.fit.residual, best.fit.residual))
+        chosen = next(drift for drift in drifts
+                      if no_worse(drift.fit.residual, best.fit.residual))
+        return replace(chosen.course, time_std=_time_std(chosen, rows))
     return None
 
 
@@ -283,7 +289,7 @@ def _best(kind: str, form: str, rows: _Rows) -> _Drift:
         course = (_step if kind == "step" else _trend)(form, shape, rows)
         own = rows.along(course) * shape
         fit = _fitted(np.column_stack([rows.steady.columns, own]), rows.y)
-    return _Drift(course, fit, float(np.median(np.abs(shape))))
+    return _Drift(course, fit, shape)
 
 
 def _trend(form: str, shape: Array, rows: _Rows) -> Course:
@@ -303,6 +309,22 @@ def _trend(form: str, shape: Array, rows: _Rows) -> Course:
     k = int(np.argmin([loss(time) for time in times]))
     low, high = float(times[max(k - 1, 0)]), float(times[min(k + 1, len(times) - 1)])
     return course(least_between(loss, low, high, FINE))
+
+
+def _time_std(drift: _Drift, rows: _Rows) -> float | None:
+    """Return the standard deviation [s] of a trend's time constant T, None of a step.
+
+    To first order in T, g(v) as it was fitted. Blocks of time enter with the residual that the
+    others leave of them: CR3, the jackknife over blocks (Bell & McCaffrey 2002, p. 169).
+    """
+    course = drift.course
+    if course.kind == "step":
+        return None
+    longer = replace(course, time=(1.0 + NEAR) * course.time)
+    change = (rows.along(longer) - rows.along(course)) / (NEAR * course.time)
+    outside = drift.fit.beside(float(drift.fit.beta[-1]) * change * drift.shape)
+    rest = rows.rest(_fitted(np.column_stack([drift.fit.columns, outside]), rows.y))
+    return float(np.linalg.norm(np.bincount(rows.blocks, outside * rest)) / (outside @ outside))
 
 
 def _step(form: str, shape: Array, rows: _Rows) -> Course:

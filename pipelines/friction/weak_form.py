@@ -101,6 +101,7 @@ class Course:
     until: float  # [s] duration of a trend's log; of a step when
     part: int = 0  # stretch of a step
     curve: tuple[Array, Array] | None = None  # speeds [rad/s] and torques [N m] of friction
+    time_std: float | None = None  # [s] of a trend's time constant
 
     def at(self, part: int, since: Array) -> Array:
         """Return c(t) in one of the stretches, `since` its start [s]: it rises by one.

@@ -70,6 +70,8 @@ def test_friction_that_warms_up_is_named_with_its_course(shared: Path, tmp_path:
     (joint,) = result["joints"]
     assert joint["drift"]["kind"] == "trend"
     assert joint["drift"]["when"] == pytest.approx(15.0, rel=0.25)
+    assert 0.0 < joint["drift"]["when_std"] < 0.25 * 15.0
+    assert abs(joint["drift"]["when"] - 15.0) < 3.0 * joint["drift"]["when_std"]
     assert joint["drift"]["change"]["value"] == pytest.approx(-0.40, abs=0.03)
     assert any(check["code"] == "RRID-D26" and "falls" in check["message"] for check in result["checks"])
     assert within(joint["inertia"], 0.5, 2.0, 0.002)
