@@ -1,4 +1,4 @@
-"""Import recordings: CSV, JSON, MAT and NumPy files become logs, by a recipe.
+"""Import recordings: CSV, JSON, MAT, NumPy and Parquet files become logs.
 
 Reads    a recipe (TOML, `pipelines.importers.recipe`) and the recorded files its patterns match
 Writes   logs/<name>.h5 or .parquet, tables/<name>.parquet (maps), result.json, report.html

@@ -98,7 +98,7 @@ def read(request: Request, settings: Settings) -> Inputs:
             "C02",
             "no logs, and no text to write",
             where="validate-writing",
-            remedy="name logs to validate on, or design the task with --text RRR",
+            remedy="name logs to validate on; of an RRR arm, --text RRR designs the task",
         )
     read_any = request.paths or request.roles
     inputs = read_logs(request, settings) if read_any else Inputs()
@@ -174,7 +174,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
             "C06",
             f"no log of role validate; there are: {kinds}",
             where=inputs.label,
-            remedy="record the writing task with role validate; --text RRR designs it",
+            remedy="record another motion with role validate; --text designs one for RRR arms",
         )
     arm, said = _model(inputs, logs, judges)
     pairs, checks = _examined(sorted(judges, key=lambda log: log.experiment != "writing"))
