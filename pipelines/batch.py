@@ -78,18 +78,20 @@ def module_of(stage: str) -> str:
 def find_items(root: Path) -> tuple[tuple[Item, ...], tuple[Check, ...]]:
     """Return every folder of logs below `root`, sorted by name, and what was passed over.
 
+    A folder that cannot be listed is an item as well: it fails alone.
+
     Raises:
         UsageError: C04, `root` does not exist; C02, it is no folder.
         NothingMatched: C06, there is no log below it.
-        EnvironmentFault: F13, a folder cannot be listed.
     """
     root = root.absolute()
     if not os.path.isdir(root):
         regular_file(root)
         words = "is a log, not a folder of folders"
         raise UsageError("C02", words, root, "run the stage on it alone")
-    logs, checks = find_logs([root])
-    folders: dict[Path, list[Path]] = {}
+    unreadable: list[Path] = []
+    logs, checks = find_logs([root], unreadable)
+    folders: dict[Path, list[Path]] = {folder: [] for folder in unreadable}
     for log in logs:
         folders.setdefault(log.parent, []).append(log)
     items = []

@@ -334,19 +334,24 @@ def expanded(inputs: Iterable[Path]) -> tuple[Path, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ...]]:
+def find_logs(
+    inputs: Iterable[Path], unreadable: list[Path] | None = None
+) -> tuple[tuple[Path, ...], tuple[Check, ...]]:
     """Return the logs named by `inputs`: files as they are, folders searched below.
 
     Hidden files, and folders that rrrid itself wrote, are passed over, unless such a folder is
     named: then its logs are meant. A link to a log is that log; links to folders, and those that
     lead nowhere, are passed over with a warning.
 
+    Args:
+        unreadable: takes the folders that cannot be listed; None: the first one is an error.
+
     Raises:
         UsageError: an input does not exist.
         EnvironmentFault: F13, a folder cannot be listed.
         NothingMatched: there is no log at all.
     """
-    inputs, found = tuple(inputs), _Found([], [], [], [])
+    inputs, found = tuple(inputs), _Found([], [], [], [], unreadable)
     for path in inputs:
         if not os.path.isdir(path):
             regular_file(path)
@@ -357,7 +362,7 @@ def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ..
             if (path / "logs").is_dir():
                 _search(path / "logs", found)
             found.logs.extend(plan for name in PLANS if (plan := path / name).is_file())
-    if found.logs:
+    if found.logs or unreadable:
         return tuple(dict.fromkeys(found.logs)), tuple(found.checks)
     words, remedy = "no log there", "logs end in .h5 or .parquet"
     if found.passed:
@@ -378,14 +383,19 @@ class _Found:
     checks: list[Check]
     passed: list[Path]  # links, and results of rrrid
     recordings: list[Path]
+    unreadable: list[Path] | None
 
 
 def _search(folder: Path, found: _Found) -> None:
     """Add what is in a folder and in those below it, in order."""
     try:
         entries = sorted(folder.iterdir())
+        os.stat(f"{folder}/.")  # listing and entering a folder are two permissions
     except OSError as problem:
-        raise fault_of(problem, folder) from None
+        if found.unreadable is None:
+            raise fault_of(problem, folder) from None
+        found.unreadable.append(folder)
+        return
     for entry in entries:
         is_log, is_folder = entry.suffix.lower() in ENDINGS, entry.is_dir()
         if entry.name.startswith("."):
@@ -395,7 +405,7 @@ def _search(folder: Path, found: _Found) -> None:
             remedy = "give what is meant by its own path, or remove it"
             found.checks.append(Check.of("X11", "warn", f"link {what} passed over", entry, remedy))
             found.passed.append(entry)
-        elif is_folder and (entry / PROVENANCE).is_file():
+        elif is_folder and os.path.isfile(entry / PROVENANCE):
             found.passed.extend([entry] * (entry / "logs").is_dir())
         elif is_folder:
             _search(entry, found)

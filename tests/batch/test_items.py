@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from pipelines.batch import find_items
+from pipelines.errors import EnvironmentFault
+from pipelines.io.files import find_logs
 from tests.batch.conftest import Lay, obey, statuses
 
 
@@ -48,3 +50,22 @@ def test_shards_together_are_all_items(lay: Lay, tmp_path: Path, of: int) -> Non
     shards = [statuses(obey(root, out=tmp_path / f"{number}", shard=(number, of))) for number in range(1, of + 1)]
     assert sorted(name for one in shards for name in one) == [f"{i:02d}" for i in range(3)]
     assert max(map(len, shards)) - min(map(len, shards)) <= 1
+
+
+@pytest.mark.row("F13", "P11")
+def test_a_folder_that_may_not_be_listed_is_an_item_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """F13, P11: the others are items as ever; the superuser, who may all, is told that he may not."""
+    _touch(tmp_path, "a/1.h5", "shut/1.h5")
+    listed = os.listdir
+
+    def refuse(path: str | Path = ".") -> list[str]:
+        if str(path).endswith("shut"):
+            raise PermissionError(13, "Permission denied", str(path))
+        return listed(path)
+
+    monkeypatch.setattr(os, "listdir", refuse)
+    items, _ = find_items(tmp_path)
+    assert {item.name: (item.paths, len(item.logs)) for item in items} == {
+        "a": ((tmp_path / "a",), 1), "shut": ((tmp_path / "shut",), 0)}
+    with pytest.raises(EnvironmentFault, match="F13"):
+        find_logs(items[1].paths)
