@@ -13,6 +13,7 @@ import fcntl
 import hashlib
 import json
 import os
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.errors import Check, EnvironmentFault, InputRejected, UsageError
+from pipelines.errors import Check, EnvironmentFault, InputRejected, UsageError, clean
 from pipelines.importers import matlab, npy
 from pipelines.importers.config import ARRAYS
 from pipelines.importers.raw import RawTable, flatten, table_of
@@ -223,7 +224,7 @@ def read_json(data: bytes, source: str) -> Any:
     """Return the document of a JSON recording: arrays by name, or frames turned into such.
 
     Raises:
-        InputRejected: F08 no JSON, X05 too large.
+        InputRejected: F08 no JSON, S03 a name twice in a frame, X05 too large.
     """
     if len(data) > ARRAYS.largest_json:
         message = f"{len(data)} bytes of JSON; import reads up to {ARRAYS.largest_json}"
@@ -234,15 +235,18 @@ def read_json(data: bytes, source: str) -> Any:
             document = json.loads(text)
         except json.JSONDecodeError:
             document = [json.loads(line) for line in text.splitlines() if line.strip()]
-        return _series(document)
+        return _series(document, source)
     except (ValueError, TypeError, AttributeError, OverflowError, RecursionError) as problem:
         message = f"not valid JSON of a recording: {problem}"
         remedy = "copy the file again, or end the recording before it is copied"
         raise InputRejected("F08", message, source, remedy) from None
 
 
-def _series(document: Any) -> Any:
-    """Return arrays by name of a document that pandas wrote, or of the longest list of frames."""
+def _series(document: Any, source: str) -> Any:
+    """Return arrays by name of a document that pandas wrote, or of the longest list of frames.
+
+    A list that a frame lacks, or that has another length there, is NaN: a missing sample.
+    """
     import pandas as pd
 
     if isinstance(document, dict) and document.keys() >= {"columns", "data"}:
@@ -256,19 +260,35 @@ def _series(document: Any) -> Any:
     found: dict[str, Any] = {}
     if isinstance(document, dict):
         found = {name: x for name, x in document.items() if not isinstance(x, list)}
-    frame = pd.DataFrame([dict(flatten(one)) for one in frames])
+    frame = pd.DataFrame([_named(one, source) for one in frames])
     for name, column in frame.items():
-        first = column.iloc[0]
+        lists = [x for x in column if isinstance(x, list)]
+        width = Counter(map(len, lists)).most_common(1)[0][0] if lists else 0
+        present = [x for x in lists if len(x) == width] or column.dropna().tolist()
+        first = present[0] if present else np.nan
         if isinstance(first, str):
             found[str(name)] = first
         elif not isinstance(first, list):
             found[str(name)] = pd.to_numeric(column, errors="coerce").to_numpy()
         elif all(isinstance(x, str) for x in first):  # the joints' names, in every frame
             found[str(name)] = " ".join(first)
-        elif len({len(x) if isinstance(x, list) else 0 for x in column}) == 1:
-            items = zip(*column, strict=True)
-            found |= {f"{name}[{k}]": array for k, x in enumerate(items) if (array := list(x))}
+        else:
+            missing = [np.nan] * width
+            rows = [x if isinstance(x, list) and len(x) == width else missing for x in column]
+            items = zip(*rows, strict=True)
+            found |= {f"{name}[{k}]": list(item) for k, item in enumerate(items)}
     return found
+
+
+def _named(frame: Mapping[str, Any], source: str) -> dict[str, Any]:
+    """Return the values of a frame by their names, each of which is there once (S03)."""
+    pairs = list(flatten(frame))
+    named = dict(pairs)
+    if len(named) < len(pairs):
+        name = Counter(name for name, _ in pairs).most_common(1)[0][0]
+        message = f"two values of a frame are both named '{clean(name, 80)}'"
+        raise InputRejected("S03", message, source, "rename one of them in the file")
+    return named
 
 
 def _lists_of_frames(value: Any, depth: int) -> Iterator[list[dict[str, Any]]]:
