@@ -50,11 +50,9 @@ _STRICT = {"extra": "forbid"}
 
 
 @dataclass(frozen=True)
-class FileSpec:
-    """`[[file]]`: where files of this pattern differ from `[log]`. The first match counts."""
+class AboutSpec:
+    """What `[log]` says of every log, and `[[file]]` of the files of a pattern."""
 
-    __pydantic_config__ = _STRICT
-    match: Texts = ()
     name: str | None = None  # may hold {groups} of the pattern, and {stem}
     experiment: Experiment | None = None  # a group {experiment}, {role} or {joint} comes first
     role: Role | None = None
@@ -63,14 +61,23 @@ class FileSpec:
     recorded: str | None = None  # ISO 8601 or a date of TOML, with its offset from UTC
     posture: tuple[float, ...] | None = None  # [rad]
     begin: float | None = None  # [s] left out of the beginning: an approach, homing
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileSpec(AboutSpec):
+    """`[[file]]`: where files of this pattern differ from `[log]`. The first match counts."""
+
+    __pydantic_config__ = _STRICT
+    match: Texts
     skip: bool = False  # files of this pattern are no logs
 
 
 @dataclass(frozen=True)
-class LogSpec(FileSpec):
+class LogSpec(AboutSpec):
     """`[log]`: of every log."""
 
     __pydantic_config__ = _STRICT
+    match: Texts = ()
     name: str = "{stem}"
     experiment: Experiment = "free"
     role: Role = "identify"

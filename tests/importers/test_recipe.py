@@ -138,3 +138,13 @@ def test_integers_without_end(digits: int) -> None:
     """No float holds the one, and Python does not even read the other."""
     with pytest.raises(UsageError, match="RRID-C0[12]"):
         parse_recipe(edited('unit = "s"', "rate = 1" + "0" * digits))
+
+
+@pytest.mark.parametrize(("more", "words"), [
+    ("[[file]]\nskip = true\n", r"RRID-C02 .*'file\[1\].match' is missing"),
+    ("[log]\nskip = true\n", r"RRID-C01 .*'log.skip' is not a key"),
+])
+def test_what_would_have_no_effect_is_refused(more: str, words: str) -> None:
+    recipe = RECIPE.replace("[log]\n", more, 1) if more.startswith("[log]") else RECIPE + more
+    with pytest.raises(UsageError, match=words):
+        parse_recipe(recipe)
