@@ -46,7 +46,10 @@ _DELIMITERS = {
     "": "one column",
 }
 _NOWHERE = "\x1f"  # a delimiter that no text has
-_TIME_OF_DAY = re.compile(r"(?<!\d)(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,](\d{1,9}))?")
+_STAMP = re.compile(
+    r"^(?P<day>.*?)(?<!\d)(?P<hour>\d{1,2}):(?P<minute>[0-5]\d):(?P<second>[0-5]\d(?:[.,:]\d+)?)"
+    r"(?:\s*(?P<half>[AaPp])\.?\s?[Mm]\b)?.*?(?P<year> \d{4})?$"
+)
 _DAY = 86400.0  # numerics: seconds
 
 
@@ -429,15 +432,44 @@ def _refuse_formula(cell: str, column: str, line: int, source: str) -> None:
 
 
 def _clock_times(cells: Any) -> Array | None:
-    """Return seconds [s] of times such as "2024-05-17T11:30:00.125Z", counted on over midnight."""
-    found = [_TIME_OF_DAY.search(str(cell)) for cell in cells]
-    if None in found or any(re.search(r"(?i)\d\s?[ap]\.?m\b", str(cell)) for cell in cells):
+    """Return seconds [s] since the first midnight of "2024-05-17T11:30:00.125Z" or "1:30:00 PM".
+
+    Times of one day, or of none, are counted on over midnight.
+    """
+    parts = cells.str.extract(_STAMP)
+    if parts["hour"].isna().any():
         return None
-    parts = [m.groups(default="0") for m in found if m is not None]
-    seconds = [3600.0 * int(h) + 60.0 * int(m) + float(f"{s}.{f}") for h, m, s, f in parts]
-    stamps = np.array(seconds)
-    again = np.diff(stamps) < -0.5 * _DAY
-    return np.asarray(stamps + _DAY * np.concatenate([[0.0], np.cumsum(again)]))
+    parts = parts.fillna("")
+    second = parts["second"].str.replace("[,:]", ".", regex=True)
+    every = (parts["hour"], parts["minute"], second)
+    hour, minute, second = (part.to_numpy(np.float64) for part in every)
+    half = parts["half"].str.lower().to_numpy(str)
+    hour = np.where(half == "", hour, hour % 12.0 + 12.0 * (half == "p"))
+    seconds = 3600.0 * hour + 60.0 * minute + second
+    days = _days(parts["day"] + parts["year"])
+    if days is not None and not days.any():
+        days = np.concatenate([[0.0], np.cumsum(np.diff(seconds) < -0.5 * _DAY)])
+    return None if days is None else seconds + _DAY * days
+
+
+def _days(cells: Any) -> Array | None:
+    """Return days since the first of dates or of texts such as "1 days"; None where it is neither.
+
+    Of 5/6 and 6/5, that reading counts in which the days are nearer together.
+    """
+    import pandas as pd
+
+    codes, texts = pd.factorize(cells.str.strip(" [(_").str.rstrip("T ,:/_-"))
+    if len(texts) == 1:
+        return np.zeros(len(cells))
+    words, read = pd.Series(texts), list[Array]()
+    if words.str.fullmatch(r"-?\d+ days?").all():
+        read.append(words.str.split().str[0].to_numpy(np.float64))
+    for first in () if read else (False, True):
+        with contextlib.suppress(ValueError, OverflowError):
+            dates = pd.to_datetime(words, format="mixed", dayfirst=first, utc=True)
+            read.append((dates - dates[0]).dt.days.to_numpy(np.float64))
+    return min(read, key=np.ptp)[codes] if read else None
 
 
 def _lists(cells: Any) -> Array | None:

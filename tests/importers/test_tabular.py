@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 
 import numpy as np
@@ -10,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipelines.errors import InputRejected
-from pipelines.importers.raw import RawTable
+from pipelines.importers.raw import RawTable, table_of
+from pipelines.importers.tables import read_json
 from pipelines.importers.text import read_text
 from tests.importers.good import good, lines, text
 
@@ -158,3 +160,37 @@ def test_f16_a_further_table_below_the_first_is_refused_with_its_line() -> None:
     names = ",".join(f"other_{k}" for k in range(7))
     with pytest.raises(InputRejected, match=r"RRID-F16.*line 602.*a further table begins, of other_0.*file of its own"):
         parse("\n".join([*rows[:601], names, *rows[601:]]) + "\n")
+
+
+@pytest.mark.parametrize(("first", "second", "seconds"), [
+    ("2024-05-17T23:59:59.5Z", "2024-05-19T00:00:00.25Z", 86400.75),
+    ("31.05.2024 23:59:59", "01.06.2024 00:00:00", 1.0),
+    ("05/31/2024 11:59:59 PM", "06/01/2024 12:00:00 AM", 1.0),
+    ("Fri May 17 23:59:59 2024", "Sat May 18 00:00:01 2024", 2.0),
+    ("0 days 00:00:00.010000", "1 days 00:00:00.020000", 86400.01),
+    ("12:59:59 PM", "1:30:00 PM", 1801.0),
+    ("23:59:59,5", "00:00:00,5", 1.0),
+])
+def test_dates_and_times_of_day_are_seconds(first: str, second: str, seconds: float) -> None:
+    """Days between two dates count, halves of a day too; times without a date go on over midnight."""
+    table = parse("t;q\n" + f"{first};1.0\n" * 10 + f"{second};2.0\n" * 10)
+    assert np.ptp(table.columns["t"]) == pytest.approx(seconds, abs=1e-9)
+    assert table.units["t"] == "s"
+
+
+@pytest.mark.parametrize("spoilt", [{}, {"q": None}, {"q": [1.0]}], ids=["lacking", "null", "ragged"])
+@pytest.mark.parametrize("at", [0, 7])
+def test_a_list_that_a_frame_lacks_is_a_missing_sample(spoilt: dict[str, object], at: int) -> None:
+    frames: list[dict[str, object]] = [{"t": 0.01 * k, "q": [1.0 * k, 2.0 * k]} for k in range(30)]
+    frames[at] = {"t": 0.01 * at} | spoilt
+    table = table_of(read_json(json.dumps(frames).encode(), "run.json"), "run.json")
+    assert list(table.columns) == ["t", "q[0]", "q[1]"]
+    for j in range(2):
+        expected = np.where(np.arange(30) == at, np.nan, (j + 1.0) * np.arange(30))
+        assert np.array_equal(table.columns[f"q[{j}]"], expected, equal_nan=True)
+
+
+def test_s03_a_name_twice_in_a_frame_is_refused() -> None:
+    frames = [{"t": 0.01 * k, "a": {"q": 1.0}, "a.q": 2.0} for k in range(30)]
+    with pytest.raises(InputRejected, match=r"RRID-S03.*'a\.q'"):
+        read_json(json.dumps(frames).encode(), "run.json")
