@@ -9,9 +9,9 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -41,8 +41,11 @@ from pipelines.quality.checks import check_log
 from pipelines.quality.subject import many
 from pipelines.quality.units import DEGREES_OR_MOTOR, TRUSTED
 
-# (t, values, grid, method) -> values on the grid, and (begin, end, rate) -> the grid
-Resampling = tuple[Any, Any]
+Method = Literal["spline", "linear"]
+# (begin, end, rate) -> the grid, and (t, values, grid, method) -> values on the grid
+Resampling = tuple[
+    Callable[[float, float, float], Array], Callable[[Array, Array, Array, Method], Array]
+]
 # What to do about it is in the recipe, and not in a file that is not written yet.
 _IN_RECIPE = {
     "RRID-S05": 'declare the unit of tau that its numbers are in, such as unit = "N mm", or '
@@ -266,8 +269,8 @@ def _derived(
 def _examine(log: ExperimentLog, recording: str, trust_units: bool) -> list[Check]:
     """Return the warnings of `inspect` about a new log, so that it passes there.
 
-    They are glitches (D06), which stay for the user of the log to decide, and time in another unit
-    (S08), which can be wrong by a thousand and contradict nothing; the import has said the others.
+    They are glitches (D06), which stay for the user of the log to decide; the import has said the
+    others.
 
     Raises:
         InputRejected: S20 unlike the format, and what `inspect` would reject or repair before
@@ -280,8 +283,6 @@ def _examine(log: ExperimentLog, recording: str, trust_units: bool) -> list[Chec
         if check.level in ("reject", "repair") and not kept:
             remedy = _IN_RECIPE.get(check.code, check.remedy)
             raise replace(check, remedy=remedy).as_error()
-        if (check.code, check.level) == ("RRID-S08", "warn"):
-            found.append(check)
         if kept:
             words = check.message.removesuffix("; left out")
             message = clean(f"{words}; kept in the log, left out of fits")
