@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import timedelta
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,14 @@ class UrdfConfig:
 
 
 @dataclass(frozen=True)
+class SessionsConfig:
+    """Bounds of a session that goes on after midnight (UTC)."""
+
+    pause: timedelta = timedelta(hours=3)  # at most: a meal, no night
+    longest: timedelta = timedelta(hours=12)  # of such a session: a day of work
+
+
+@dataclass(frozen=True)
 class LimitsConfig:
     """How much may be wrong with the samples of a log."""
 
@@ -86,6 +95,7 @@ class LimitsConfig:
 
 LIMITS = LimitsConfig()
 SANDBOX = SandboxConfig()
+SESSIONS = SessionsConfig()
 TEXT = TextConfig()
 FORMAT = FormatConfig()
 URDF = UrdfConfig()

@@ -8,13 +8,16 @@ Sessions differ in attributes of their logs (robot, description, day), never in 
 
 from __future__ import annotations
 
+import contextlib
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 from pipelines.errors import Check, InputRejected, RrridError, UsageError, clean, did_you_mean
+from pipelines.io.config import SESSIONS
 from pipelines.io.files import Opened, find_logs, open_log
 from pipelines.io.output import written_by
 from pipelines.io.robot import RobotDescription
@@ -117,12 +120,7 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
     if not request.named:
         raise UsageError("C02", "no logs", "LOGS", "name logs, or folders of logs")
     by_role = _by_role(request.roles)
-    roles: dict[Path, str] = {}
-    for role, given in by_role.items():
-        for file in find_logs(given)[0]:
-            if roles.setdefault(file, role) != role:
-                words = f"{file.name} is named for {roles[file]} and for {role}"
-                raise UsageError("C02", words, f"--{role}", "name it for one of them")
+    roles = _roles_of(by_role)
     paths, checks = find_logs(dict.fromkeys(request.named))
     robot = load_robot(request.robot) if request.robot is not None else None
     logs: list[Opened] = []
@@ -164,6 +162,21 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
         words = f"no session '{request.session}'{did_you_mean(request.session, known)}"
         raise UsageError("C01", words, "--session", f"there are: {', '.join(known)}")
     return only(inputs, fitting[0])
+
+
+def _roles_of(by_role: Mapping[str, Sequence[Path]]) -> dict[Path, str]:
+    """Return the role for which each file is named.
+
+    Raises:
+        UsageError: C02, one for two roles.
+    """
+    roles: dict[Path, str] = {}
+    for role, given in by_role.items():
+        for file in find_logs(given)[0]:
+            if roles.setdefault(file, role) != role:
+                words = f"{file.name} is named for {roles[file]} and for {role}"
+                raise UsageError("C02", words, f"--{role}", "name it for one of them")
+    return roles
 
 
 def _all_of(rejected: list[Rejected]) -> RrridError:
@@ -222,7 +235,7 @@ def apart(logs: Iterable[Opened], named: Collection[Path] = ()) -> tuple[Session
 
 
 def _grouped(logs: Iterable[Opened], named: Collection[Path]) -> dict[Key, list[Opened]]:
-    """Return the logs by the robot's name, its description, and the day (UTC).
+    """Return the logs by the robot's name, its description, and the day on which they began (UTC).
 
     Reference logs go with every later day, or with the only one; a plan, and what is in `named`,
     with every day of its robot. A day of which all logs judge (role "validate") goes with the day
@@ -231,9 +244,8 @@ def _grouped(logs: Iterable[Opened], named: Collection[Path]) -> dict[Key, list[
     """
     groups: dict[Key, list[Opened]] = defaultdict(list)
     others: list[tuple[Key, Opened]] = []
-    for opened in logs:
+    for key, opened in _across_midnight(list(logs)):
         log = opened.log
-        key = (log.robot_name, log.robot_text, (log.recorded or "")[:10])
         if opened.path in named or log.origin == "planned" or log.role == "reference":
             others.append((key, opened))
         else:
@@ -253,6 +265,29 @@ def _grouped(logs: Iterable[Opened], named: Collection[Path]) -> dict[Key, list[
         for day in chosen or _days(groups, key) or [(*key[:2], "")]:
             groups[day].append(opened)
     return groups
+
+
+def _across_midnight(logs: list[Opened]) -> list[tuple[Key, Opened]]:
+    """Return the logs with their keys, those of a session across midnight (UTC) with its first day.
+
+    It is one session where the pause is at most three hours, and all of it twelve. Reference logs
+    and hours that are not given decide nothing.
+    """
+    keys = [(o.log.robot_name, o.log.robot_text, (o.log.recorded or "")[:10]) for o in logs]
+    times: dict[Key, list[datetime]] = defaultdict(list)
+    for key, opened in zip(keys, logs, strict=True):
+        recorded = opened.log.recorded or ""
+        if "T" in recorded and opened.log.role != "reference":
+            with contextlib.suppress(ValueError):  # 30 February
+                times[key].append(datetime.fromisoformat(recorded))
+    same: dict[Key, Key] = {}
+    for key, after in sorted(times.items()):
+        before = (*key[:2], (min(after) - timedelta(days=1)).date().isoformat())
+        if before in times and before not in same:
+            pause, whole = min(after) - max(times[before]), max(after) - min(times[before])
+            if pause <= SESSIONS.pause and whole <= SESSIONS.longest:
+                same[key] = before
+    return [(same.get(key, key), opened) for key, opened in zip(keys, logs, strict=True)]
 
 
 def _join_days(groups: dict[Key, list[Opened]]) -> None:

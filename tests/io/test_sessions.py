@@ -46,3 +46,15 @@ def test_several_robots_are_refused_with_the_names_of_all() -> None:
     assert refused.value.exit_code == 2
     assert refused.value.as_dict()["sessions"] == list(refused.value.names)
     assert of_one_session(Inputs((b,))).logs == (b,)
+
+
+@pytest.mark.parametrize(("hours", "sessions"), [
+    (("2026-03-02T22:00", "2026-03-02T23:30", "2026-03-03T01:00"), 1),  # an afternoon in California
+    (("2026-03-02T23:50", "2026-03-03T02:40", "2026-03-03T09:00"), 1),  # a morning in Japan
+    (("2026-03-02T22:00", "2026-03-03T01:01"), 2),  # a pause of more than three hours
+    (("2026-03-02T15:00", "2026-03-02T22:00", "2026-03-03T00:30", "2026-03-03T03:01"), 2),  # more than twelve hours
+])
+def test_a_session_goes_on_across_midnight(hours: tuple[str, ...], sessions: int) -> None:
+    found = together(*(opened(hour, recorded=f"{hour}:00Z") for hour in hours))
+    assert len(found) == sessions
+    assert [day[-10:] for day in found] == ["2026-03-02", "2026-03-03"][:sessions]
