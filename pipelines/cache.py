@@ -32,6 +32,7 @@ from pipelines.io.output import (
     hash_file,
     listed_outputs,
     remove_folder,
+    slug,
     staging_folder,
 )
 from pipelines.io.results import encode, json_text
@@ -191,6 +192,7 @@ class Store:
     def __init__(self, out: Path, no_cache: bool = False) -> None:
         self.out, self.no_cache = out, no_cache
         self.new: Path | None = None  # the folder of what this run has computed
+        self._lock = contextlib.ExitStack()
 
     def recall(self, stage: str, key: Key | None = None) -> Entry | str:
         """Return the stored result of `key`, or of any key; or why it must be computed."""
@@ -239,10 +241,18 @@ class Store:
             (folder / "entry.json").write_text(text, encoding="utf-8")
         return Entry(root, stage, told)
 
+    def hold(self) -> None:
+        """Lock `out` for this run alone, by a hidden folder beside it (P08)."""
+        out = self.out.absolute()
+        folder = out.parent / f".rrrid-lock-{slug(out.name)}"
+        self._lock.enter_context(locked(folder, self.out))
+        self._lock.callback(remove_folder, folder)
+
     def release(self) -> None:
-        """Remove what was not put into an output."""
+        """Remove what was not put into an output, and let go of the lock."""
         if self.new is not None:
             remove_folder(self.new)
+        self._lock.close()
 
 
 def _about(root: Path, stage: str) -> dict[str, Any] | None:

@@ -124,6 +124,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     """Run every stage on what those before it leave; take what is unchanged from the cache."""
     _refuse_unknown(settings)
     given: Material = inputs.material
+    given.store.hold()
     chain, steps = Chain(inputs), []
     for stage, own in _wanted(settings):
         key = chain.key(stage, own)

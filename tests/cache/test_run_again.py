@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from pipelines import cache, estimate_bps, inspect, reconstruct, run, validate_writing
-from pipelines.errors import UsageError
+from pipelines.errors import EnvironmentFault, UsageError
 from pipelines.io.files import open_log, write_log
 from pipelines.io.log import ExperimentLog
 from pipelines.report import render
@@ -188,3 +188,16 @@ def test_a_stage_reads_no_other_logs_than_it_says(module: str, samples: Path) ->
         assert stage.compute(replace(inputs, logs=shut), settings) is not None
     except NothingMatched:
         assert module == "frf"
+
+
+@pytest.mark.row("P08")
+def test_of_two_runs_with_one_output_the_second_is_refused(small: Path) -> None:
+    """P08: exit 6 while the first one runs; afterwards nothing is left of the lock."""
+    first = cache.Store(small / "out")
+    first.hold()
+    with pytest.raises(EnvironmentFault, match="locked by process") as refused:
+        go(small, no_report=True)
+    assert (refused.value.code, refused.value.exit_code) == ("RRID-P08", 6)
+    first.release()
+    assert go(small, no_report=True)[1] == []
+    assert sorted(path.name for path in small.iterdir()) == ["logs", "out"]
