@@ -160,8 +160,14 @@ def parse_model(text: str, where: object = "") -> ModelFile:
     """
     from pydantic import ValidationError
 
+    def once(pairs: list[tuple[str, object]]) -> dict[str, object]:
+        names = [name for name, _ in pairs]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise _wrong(f"'{twice[0]}' stands twice in one object", where)
+        return dict(pairs)
+
     try:
-        table = json.loads(text)
+        table = json.loads(text, object_pairs_hook=once)
     except (ValueError, RecursionError) as problem:
         raise _wrong(f"the JSON is broken: {problem}", where) from None
     if not isinstance(table, dict) or table.get("format") != FORMAT:
@@ -181,6 +187,10 @@ def parse_model(text: str, where: object = "") -> ModelFile:
     names = [parameter.name for parameter in model.base_parameters]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise _wrong(f"base parameter {twice[0]} stands twice", where)
+    for key in ("speed", "acceleration", "posture", "temperature"):
+        for limits in getattr(model.validity, key, None) or ():
+            if limits is not None and limits[0] > limits[1]:
+                raise _wrong(f"validity.{key} runs from {limits[0]} to {limits[1]}", where)
     return model
 
 

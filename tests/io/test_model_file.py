@@ -53,6 +53,8 @@ def changed(change: Callable[[dict[str, Any]], object]) -> Callable[[str], str]:
     (lambda text: "[" * 100_000, "S18", "not a model file"),
     (lambda text: text.replace("0.2921", "NaN"), "S18", "broken"),
     (lambda text: text.replace('"name": "p1"', '"name": "p1", "name": "p2"'), "S18", "stands twice"),
+    (lambda text: text.replace('"value": 0.2921', '"value": 9.0, "value": 0.2921'), "S18", "'value' stands twice"),
+    (changed(lambda t: t["validity"]["speed"].insert(0, [1.0, -1.0])), "S18", "validity.speed runs from 1.0 to -1.0"),
     (changed(lambda t: t.update(format_version=2)), "F11", "understands up to 1"),
     (changed(lambda t: t.pop("robot")), "S18", "robot is missing"),
     (changed(lambda t: t.update(efects=[])), "S18", "did you mean 'effects'"),
