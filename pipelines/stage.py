@@ -352,13 +352,15 @@ def _new_folder(out: Path) -> Iterator[Path]:
 def footer_of(command: str, inputs: Mapping[str, str]) -> dict[str, str]:
     """Return the foot of a report: versions, and inputs (path -> SHA-256).
 
-    Each has the name of its file, one of several of that name with the folders above it.
+    Each has the name of its file, one of several of that name with as many of the folders above it
+    as make it unlike the others.
     """
-    files = Counter(Path(path).name for path in inputs)
+    ends = {path: [Path(path).parts[-n:] for n in range(1, len(Path(path).parts) + 1)]
+            for path in inputs}  # fmt: skip
+    times = Counter(end for own in ends.values() for end in own)
     named = {}
     for path, value in sorted(inputs.items())[: REPORT.inputs]:
-        name = Path(path).name
-        name = name if files[name] == 1 else str(Path(*Path(path).parts[-3:]))
+        name = next((str(Path(*end)) for end in ends[path] if times[end] == 1), path)
         named[f"input {name}"] = value[:16]
     return {"command": f"rrrid {command}", "version": __version__} | named
 

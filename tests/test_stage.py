@@ -13,7 +13,7 @@ from pipelines import convert, inspect
 from pipelines.errors import Check, InputRejected, UsageError
 from pipelines.io.files import write_log
 from pipelines.report.report import Report
-from pipelines.stage import Inputs, Request, Stage, read_logs, run_stage, tilde
+from pipelines.stage import Inputs, Request, Stage, footer_of, read_logs, run_stage, tilde
 from tests.folders import contents
 from tests.io.logs import small_log
 
@@ -140,3 +140,11 @@ def test_a_failed_stage_leaves_the_earlier_result(logs: Path) -> None:
         run_stage(_stage(lambda inputs, settings: _Nothing(), write=fail), _request(logs), _Nothing())
     assert contents(logs.parent / "out") == before
     assert sorted(p.name for p in logs.parent.iterdir()) == ["logs", "out"]
+
+
+def test_the_foot_of_a_report_names_every_input() -> None:
+    """Inputs alike in their last parts have as many folders before them as make them differ."""
+    places = ("/data/mon/arm/logs/raw/a.h5", "/data/tue/arm/logs/raw/a.h5", "/data/tue/arm/logs/raw/b.h5")
+    foot = footer_of("run", dict.fromkeys(places, "0" * 64))
+    assert [name.removeprefix("input ") for name in foot if name.startswith("input ")] == [
+        "mon/arm/logs/raw/a.h5", "tue/arm/logs/raw/a.h5", "b.h5"]
