@@ -78,7 +78,8 @@ def degrees(s: Subject) -> Sequence[Check | NotTested]:
 
 
 def _written(signal: str, unit: str) -> str:
-    return f'units = "{unit}" of /signals/{signal}, without the attribute digest of /'
+    places = f"/signals/{signal} (HDF5) or the columns {signal}_1, {signal}_2, … (Parquet)"
+    return f'units = "{unit}" of {places}, without the attribute digest'
 
 
 UNIT_CHECKS = (torque_unit, degrees)
