@@ -86,7 +86,7 @@ def collect(
             read[name] = read_table(patterns.inside(folder, name, path), recipe.format, name)
         return read[name]
 
-    cases = [*recipe.file, *([FileSpec(recipe.log.match)] if recipe.log.match else [])]
+    cases = [*recipe.file, *([FileSpec(match=recipe.log.match)] if recipe.log.match else [])]
     every = [case.match for case in cases] + [spec.match for spec in recipe.table]
     fits = patterns.matches(every, names, path)
     firsts = {n: next((k for k in range(len(cases)) if n in fits[k]), None) for n in names}
@@ -292,16 +292,20 @@ def assemble(source: Source, material: Material, mapped: Map) -> Assembled:
     parts = _joined(recordings, time.column is not None, checks)
     begin = recipe.log.begin if source.case.begin is None else source.case.begin
     if begin:
-        kept = [~(part.t < float(np.nanmin(part.t)) + begin) for part in parts]
-        for part, keep in zip(parts, kept, strict=True):
-            message = f"the first {begin:g} s, {int(np.sum(~keep))} samples, left out as the "
-            checks.append(Check.of("T04", "ok", f"{message}recipe says", part.where))
-        parts = tuple(part.take(keep) for part, keep in zip(parts, kept, strict=True))
+        parts = tuple(_begun(part, begin, checks) for part in parts)
     if len(parts) > 1 and recipe.resample is None:
         message, where = "the files have different time stamps", ", ".join(source.tables)
         remedy = "add [resample] rate = … to bring them on one clock"
         raise InputRejected("T06", message, where, remedy)
     return Assembled(parts, units, columns, tuple(checks), tuple(undeclared))
+
+
+def _begun(part: Recording, begin: float, checks: list[Check]) -> Recording:
+    """Return a recording without its first `begin` [s]."""
+    kept = ~(part.t < float(np.nanmin(part.t)) + begin)
+    message = f"the first {begin:g} s, {int(np.sum(~kept))} samples, left out as the recipe says"
+    checks.append(Check.of("T04", "ok", message, part.where))
+    return part.take(kept)
 
 
 def _joined(
