@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import h5py
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from pipelines.io.files import write_log
@@ -59,6 +62,23 @@ def test_the_repair_that_is_named_is_one(signal: str, unit: str, tmp_path: Path,
         file[f"signals/{signal}"].attrs["units"] = unit
         del file.attrs["digest"]
     done = command("inspect", "log.h5", "--no-report", "--out", "out")
+    assert done.exit == 0
+    assert {c["code"] for c in done.object["checks"] if c["level"] != "ok"} == {"RRID-F05", "RRID-S06"}
+
+
+def test_the_repair_of_a_parquet_log_is_one(tmp_path: Path, command: Command) -> None:
+    """S05: with the unit written to the columns, and without the digest, the log is in order."""
+    fault = next(f for f in FAULTS if f.row == "S05")
+    write_log(tmp_path / "log.parquet", fault.make(good_log()))
+    refused = command("inspect", "log.parquet", "--no-report", "--out", "out")
+    assert any("tau_1, tau_2, … (Parquet)" in check["remedy"] for check in refused.told("S05"))
+    table = pq.read_table(tmp_path / "log.parquet")
+    about = json.loads(table.schema.metadata[b"rrrid"])
+    del about["digest"]
+    columns = [field.with_metadata({**field.metadata, b"units": b"N mm"}) if field.name.startswith("tau_") else field
+               for field in table.schema]
+    pq.write_table(table.cast(pa.schema(columns, {b"rrrid": json.dumps(about).encode()})), tmp_path / "log.parquet")
+    done = command("inspect", "log.parquet", "--no-report", "--out", "out")
     assert done.exit == 0
     assert {c["code"] for c in done.object["checks"] if c["level"] != "ok"} == {"RRID-F05", "RRID-S06"}
 
