@@ -60,7 +60,7 @@ def robot_sources(source: str | Path) -> tuple[Path, ...]:
 
 
 def split_tip(source: str) -> tuple[str, str | None]:
-    """Return the file of "arm.urdf:hand" and the link after the colon; None where there is none."""
+    """Return the file of "arm.urdf:hand" and the link after the colon; None without one."""
     found = re.fullmatch(r"(.+\.\w+):([^/]+)", source)
     return (found[1], found[2]) if found else (source, None)
 

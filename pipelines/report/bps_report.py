@@ -83,7 +83,7 @@ def _verdict(result: Result) -> str:
 
 
 def _contradictions(result: Result) -> tuple[str, ...]:
-    """What the estimate's own checks say against its parameters or their standard deviations."""
+    """Return the checks that contradict the parameters or their standard deviations."""
     return _paragraphs("contradictions", result.balance, *_settling(result), BalanceConfig.alone)
 
 
@@ -286,7 +286,7 @@ def _trust_section(result: Result) -> Section:
 
 
 def _balance_words(balance: Balance | None) -> tuple[str, ...]:
-    """What the balance of power says, and what a difference would mean."""
+    """Report the balance of power, and what a difference would mean."""
     if balance is None:
         return ()
     closed = balance.closure > BalanceConfig.closed

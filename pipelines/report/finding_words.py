@@ -69,7 +69,7 @@ def _gain(one: Finding, found: Result) -> str:
     """Return the held-out torque error of its joint, or of the largest, without and with it."""
     torque = one.gain.validate_torque_rms
     joint = int(np.argmax(torque.before - torque.after)) if one.joint is None else one.joint - 1
-    unit, scale = "N m", 1.0
+    unit, scale = _torque_unit(one), 1.0
     if joint < len(found.rated) and np.isfinite(found.rated[joint]):
         unit, scale = "% of rated", 100.0 / found.rated[joint]
     before, after = (
@@ -77,6 +77,12 @@ def _gain(one: Finding, found: Result) -> str:
     )
     at = f" of joint {joint + 1}" if one.joint is None else ""
     return f"held-out torque error{at} {before} → {after} {unit}"
+
+
+def _torque_unit(one: Finding) -> str:
+    """Return the unit of the torque of a finding: "N" at a sliding joint, by its numbers."""
+    units = {value.unit for name, value in one.parameters.items() if not name.startswith("force")}
+    return "N" if units & {"N", "N s/m", "N/m"} else "N m"  # the force of a contact is at the tip
 
 
 def _probability(p: float | None) -> str:
@@ -118,7 +124,8 @@ def how_much(one: Finding) -> str:
     name = effect.words.size
     size = one.parameters.get(name)
     if size is None or not isinstance(size.value, int | float) or not np.isfinite(size.value):
-        return f"{format_number(one.torque_rms, 2)} N m rms" if np.isfinite(one.torque_rms) else ""
+        known = np.isfinite(one.torque_rms)
+        return f"{format_number(one.torque_rms, 2)} {_torque_unit(one)} rms" if known else ""
     times, unit = _USUAL.get(size.unit, (1.0, size.unit))
     if name == "angle":
         times, unit = 1.0 / _DEGREE, "°"

@@ -44,7 +44,7 @@ def course(log: ExperimentLog, q: Pair, dq: Pair, tau: Pair | None) -> Course:
 
 
 def _envelope(x: Array, size: int) -> Array:
-    """(2 stretches, joints): lowest and highest of each `size` samples, NaN where there is none."""
+    """(2 stretches, joints): lowest and highest of each `size` samples, NaN without any."""
     first = np.arange(0, len(x), size)
     low = np.minimum.reduceat(np.where(np.isnan(x), np.inf, x), first, axis=0)
     high = np.maximum.reduceat(np.where(np.isnan(x), -np.inf, x), first, axis=0)

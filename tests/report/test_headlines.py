@@ -46,6 +46,13 @@ def test_alternatives_stand_in_the_line(cause: str) -> None:
     assert "or coupled transmission at joint 2 (shoulder) (p = 0.20), or 2 more: these logs do not separate them." in said
 
 
+def test_a_sliding_joint_has_forces() -> None:
+    """The numbers of a finding there are in N, and so are its errors."""
+    (said,) = lines(replace(finding("torque_offset"), parameters={"offset": Value(0.5, 0.01, "N")}))
+    assert "0.500 ± 0.010 N (p" in said
+    assert "0.02 → 0.005 N, 98 %" in said
+
+
 @pytest.mark.parametrize(("cause", "joint", "name", "value", "said"), [
     ("payload", None, "mass", Value(0.15004, 1e-4, "kg"), "0.15004 ± 0.00010 kg"),
     ("torque_gain", 1, "gain_error", Value(-0.1004, 1e-3, "1"), "−10.04 ± 0.10 %"),
