@@ -226,7 +226,7 @@ def _result(
         convergence=growth.beta,
         convergence_std=growth.std,
         courses=tuple(
-            course(log, motion, parts, fitted.cutoff_hz)
+            course(log, motion, parts, fitted.recipe.cutoff_hz)
             for log, motion, parts in torques[:_COURSES]
         ),
         arm=arm,

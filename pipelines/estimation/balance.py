@@ -29,8 +29,8 @@ from pipelines.estimation.estimate import Estimate
 from pipelines.estimation.least_squares import (
     Block,
     Flags,
-    Gram,
     Indices,
+    Statistics,
     gather_growing,
     solve,
     split,
@@ -108,7 +108,7 @@ def power_balance(found: Estimate) -> Balance | None:
     )
 
 
-def _jackknife(groups: list[Gram], beta: Array) -> Array:
+def _jackknife(groups: list[Statistics], beta: Array) -> Array:
     """(G - 1)/G Σ_g (β_(g) - β)(β_(g) - β)ᵀ, β_(g) without group g.
 
     True to noise that depends on motion and on its past: the error of an energy is that of speed

@@ -13,9 +13,8 @@ that ten seconds are enough:
     M = 1/n Σ_f Σ_ij w_i w_j conj(a_i(f)) S_ij(f) a_j(f)ᵀ,   a(f) the transform of the columns
 
 S is prewhitened by an autoregression of each channel (Andrews & Monahan 1992), then averaged over
-bands: an autoregression alone misses what a sharp filter does, averages alone smear a peak.
-
-Memory: the transform of one block, every block padded to the longest.
+bands: an autoregression alone misses what a sharp filter does, averages alone smear a peak. Memory:
+the transform of one block, every block padded to the longest.
 """
 
 from __future__ import annotations
@@ -25,17 +24,18 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from pipelines.estimation.chain import Complex
 from pipelines.estimation.config import CovarianceConfig
 from pipelines.estimation.filters import fast_length
-from pipelines.estimation.least_squares import Block, Indices, Solution
+from pipelines.estimation.least_squares import Block, Solution
 from pipelines.io.log import Array
 
-Spectra = tuple[Complex, ...]
+Complex = npt.NDArray[np.complex128]
 
 _CONFIG = CovarianceConfig()
 _PADDING = 8  # numerics: an eighth of a block of zeros, so that its end is far from its beginning
+_ALIKE = 1e-12  # numerics: channels may be exact multiples of one another
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,108 +45,82 @@ class Robust:
     covariance: Array  # (k, k); infinite where β is not determined
     white: bool  # the residual can pass for white of one strength, its channels for independent
     inflation: Array  # (k,) standard deviation over that of white noise
-    orders: tuple[int, ...]  # of each channel's autoregression
 
     @property
     def std(self) -> Array:
         return np.sqrt(np.diag(self.covariance))
 
 
-@dataclass(frozen=True, eq=False)
-class _Noise:
-    """A cross-spectrum S = H L Lᴴ Hᴴ: H shapes each channel, L mixes them within a band."""
-
-    length: int  # samples of the Fourier transform
-    shape: Complex  # (channels, frequencies)
-    edges: Indices  # (bands + 1,)
-    mix: Complex  # (bands, channels, channels) lower triangular
-    orders: tuple[int, ...]
-    white: bool
-
-
 def robust_covariance(equations: Iterable[Block], solution: Solution, longest: int) -> Robust:
-    """Return the covariance of `solution` by two passes over its equations; one where they are a
-    single block, or the residual is white.
+    """Return the covariance of `solution` by two passes over its equations; one of white noise.
 
     Args:
         longest: samples of the longest block (`Statistics.longest`).
     """
     length = fast_length(longest + longest // _PADDING + 1)
-    noise, alone = _noise_of(equations, solution, length)
+    noise = _spectrum(equations, solution, length)
     plain = np.diag(solution.covariance)
-    if noise.white:
-        return Robust(solution.covariance, True, np.ones(len(plain)), noise.orders)
+    if noise is None:
+        return Robust(solution.covariance, True, np.ones(len(plain)))
     meat = np.zeros_like(solution.bread)
-    parts = ((b, _spectra(b, length)) for b in equations) if alone is None else (alone,)
-    for block, spectra in parts:
-        _add_meat(meat, block, spectra, solution.weights, noise)
+    for block in equations:
+        _add_meat(meat, block, solution.weights, noise, length)
     covariance = solution.bread @ meat @ solution.bread
     # below 0 by rounding, of numbers next to undetermined ones
     determined = solution.determined & (np.diag(covariance) >= 0.0)
     variance = np.maximum(np.diag(covariance), 0.0)
     inflation = np.sqrt(variance / np.where(plain > 0.0, plain, 1.0))
     covariance[~determined] = covariance[:, ~determined] = np.inf
-    return Robust(covariance, False, np.where(determined, inflation, 1.0), noise.orders)
+    return Robust(covariance, False, np.where(determined, inflation, 1.0))
 
 
-def _spectra(block: Block, length: int) -> Spectra:
-    """Return the Fourier transforms a(f) (k_j, frequencies) of each channel's columns."""
-    return tuple(np.fft.rfft(values, length, axis=1) for values in block.values)
+def _add_meat(meat: Array, block: Block, weights: Array, noise: Complex, length: int) -> None:
+    """Add 1/n Σ_f conj(Z)ᵀ Z with Z = Nᴴ [w_j a_j(f)ᵀ], S = N Nᴴ: as a square M stays positive.
 
-
-def _add_meat(meat: Array, block: Block, spectra: Spectra, weights: Array, noise: _Noise) -> None:
-    """Add 1/n Σ_f conj(Z)ᵀ Z with Z = Lᴴ Hᴴ [w_j a_j(f)ᵀ]: S as a square keeps M positive."""
-    bins = noise.shape.shape[1]
-    twice = np.full(bins, np.sqrt(2.0 / noise.length))  # negative frequencies
-    twice[0] = np.sqrt(1.0 / noise.length)
-    if noise.length % 2 == 0:
+    Args:
+        noise: N (channels, channels, frequencies), lower triangular.
+    """
+    spectra = [np.fft.rfft(values, length, axis=1) for values in block.values]
+    twice = np.full(noise.shape[2], np.sqrt(2.0 / length))  # negative frequencies
+    twice[0] = np.sqrt(1.0 / length)
+    if length % 2 == 0:
         twice[-1] = twice[0]
-    width = np.diff(noise.edges)
-    for a in range(len(weights)):
-        felt = [j for j in range(a, len(weights)) if noise.mix[:, j, a].any()]
-        factors = {
-            j: weights[j] * twice * np.conj(noise.shape[j] * np.repeat(noise.mix[:, j, a], width))
-            for j in felt
-        }
-        if felt == [a]:  # its phase does not matter
-            used, mixed = block.columns[a], spectra[a] * np.abs(factors[a])
-        else:
-            used = np.unique(
-                np.concatenate([block.columns[a][:0], *(block.columns[j] for j in felt)])
-            )
-            mixed = np.zeros((len(used), bins), dtype=np.complex128)
-            for j in felt:
-                mixed[np.searchsorted(used, block.columns[j])] += spectra[j] * factors[j]
-        # columns stored with samples slowest are not contiguous
-        real = np.ascontiguousarray(mixed).view(np.float64)
+    for source in range(len(weights)):
+        felt = [j for j in range(len(weights)) if noise[j, source].any()]
+        if not felt:
+            continue
+        used = np.unique(np.concatenate([block.columns[j] for j in felt]))
+        mixed = np.zeros((len(used), noise.shape[2]), dtype=np.complex128)
+        for j in felt:
+            factor = weights[j] * twice * np.conj(noise[j, source])
+            mixed[np.searchsorted(used, block.columns[j])] += spectra[j] * factor
+        real = mixed.view(np.float64)
         meat[np.ix_(used, used)] += real @ real.T
 
 
-def _noise_of(
-    equations: Iterable[Block], solution: Solution, length: int
-) -> tuple[_Noise, tuple[Block, Spectra] | None]:
-    """Return the residual's cross-spectrum; and the block with its spectra where it is the only."""
+def _spectrum(equations: Iterable[Block], solution: Solution, length: int) -> Complex | None:
+    """Return N (channels, channels, frequencies), the residual's cross-spectrum S = N Nᴴ.
+
+    None where the residual can pass for white.
+    """
     channels, bins = len(solution.weights), length // 2 + 1
     cross = np.zeros((channels, channels, bins), dtype=np.complex128)
     leverage, counts = np.zeros((channels, bins)), np.zeros(channels)
-    samples = longest = blocks = 0
+    samples = longest = 0
     for block in equations:
         residual = np.fft.rfft(block.residual(solution.beta), length, axis=1)
         cross += residual[:, None] * np.conj(residual)
-        last = block, _spectra(block, length)
-        leverage += _leverage(*last, solution)
+        leverage += _leverage(block, solution, length)
         samples, longest = samples + block.samples, max(longest, block.samples)
-        counts, blocks = counts + block.counts, blocks + 1
+        counts += block.counts
     counts = np.maximum(counts, 1.0)
-    # equations left out have no noise
-    cross /= np.sqrt(counts[:, None] * counts)[:, :, None]
+    cross /= np.sqrt(counts[:, None] * counts)[:, :, None]  # equations left out have no noise
     own = np.arange(channels)
     gamma = np.fft.irfft(cross[own, own], length, axis=1)
     # what is further apart than a block is long, no block tells
     most = min(_CONFIG.order, samples // 20, longest // 2)
     fits = [_autoregression(g, samples, most) for g in gamma]
     shape = np.array([1.0 / np.fft.rfft(a, length) for a in fits])
-    orders = tuple(len(a) - 1 for a in fits)
     # n samples have n / 2 frequencies of their own
     width = max(1, _CONFIG.bins * length // samples)
     edges = np.linspace(0, bins, max(1, bins // width) + 1).astype(np.intp)
@@ -156,26 +130,27 @@ def _noise_of(
     mean = _mean(flat, edges) / (left[:, None] * left)
     together = _correlated(flat, mean, length, samples)
     if not together:
+        if all(len(a) == 1 for a in fits):
+            return None
         mean[~np.eye(channels, dtype=bool)] = 0.0
-    mix, white = _factor(mean.transpose(2, 0, 1)), not any(orders) and not together
-    noise = _Noise(length, shape, edges, mix, orders, white)
-    return noise, last if blocks == 1 else None
+    mix = np.repeat(_root(mean.transpose(2, 0, 1)), np.diff(edges), axis=0)
+    return np.asarray(shape[:, None] * mix.transpose(1, 2, 0))
 
 
-def _leverage(block: Block, transforms: Spectra, solution: Solution) -> Array:
+def _leverage(block: Block, solution: Solution, length: int) -> Array:
     """w aᴴ C a (channels, frequencies): the share of the noise that the parameters take up.
 
     It is largest where the columns are, which is where S matters: E|r|² = (1 - h) S.
     """
     rows = []
-    for index, spectra, w in zip(block.columns, transforms, solution.weights, strict=True):
-        values, vectors = np.linalg.eigh(solution.bread[np.ix_(index, index)])
-        part = (vectors * np.sqrt(np.maximum(w * values, 0.0))).T @ spectra
-        rows.append(np.square(part.real).sum(axis=0) + np.square(part.imag).sum(axis=0))
+    for index, values, w in zip(block.columns, block.values, solution.weights, strict=True):
+        size, vectors = np.linalg.eigh(solution.bread[np.ix_(index, index)])
+        turned = (vectors * np.sqrt(np.maximum(w * size, 0.0))).T @ values
+        rows.append(np.square(np.abs(np.fft.rfft(turned, length, axis=1))).sum(axis=0))
     return np.array(rows)
 
 
-def _mean(values: Any, edges: Indices) -> Any:
+def _mean(values: Any, edges: npt.NDArray[np.intp]) -> Any:
     """Return averages over bands of the last axis."""
     return np.add.reduceat(values, edges[:-1], axis=-1) / np.diff(edges)
 
@@ -187,29 +162,25 @@ def _autoregression(gamma: Array, samples: int, most: int) -> Array:
     """
     a, power = np.ones(1), float(gamma[0])
     best, least = a, 0.0
-    if power <= 0.0:
-        return best
     for order in range(1, most + 1):
+        if power <= 1e-13 * gamma[0]:
+            break
         reflection = -float(a @ gamma[order:0:-1]) / power
         a = np.append(a, 0.0)
         a = a + reflection * a[::-1]
         power *= 1.0 - reflection**2
-        if power <= 1e-13 * gamma[0]:
-            break
-        criterion = samples * np.log(power / gamma[0]) + order * np.log(samples)
+        criterion = samples * np.log(max(power / gamma[0], 1e-300)) + order * np.log(samples)
         if criterion < least:
             best, least = a, criterion
     return best
 
 
-def _factor(spectrum: Complex) -> Complex:
+def _root(spectrum: Complex) -> Complex:
     """Return lower triangular L with L Lᴴ = S for each band; zero of a channel without noise."""
     power = np.einsum("bjj->bj", spectrum).real
     scale = np.sqrt(np.where(power > 0.0, power, 1.0))
-    unit = spectrum / scale[:, :, None] / scale[:, None, :]
-    eye = np.eye(unit.shape[1])
-    unit += 1e-12 * eye  # channels may be exact multiples of one another
-    root = np.linalg.cholesky(unit + np.where(power > 0.0, 0.0, 1.0)[:, :, None] * eye)
+    eye = np.eye(power.shape[1]) * (_ALIKE + (power <= 0.0))[:, :, None]
+    root = np.linalg.cholesky(spectrum / scale[:, :, None] / scale[:, None, :] + eye)
     return np.asarray(root * np.where(power > 0.0, scale, 0.0)[:, :, None])
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +22,6 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.estimation.config import EstimateConfig
 from pipelines.estimation.covariance import Robust, robust_covariance
 from pipelines.estimation.filters import KEEP
-from pipelines.estimation.held_out import by_blocks
 from pipelines.estimation.identifiability import (
     Unresolved,
     condition_number,
@@ -37,7 +36,7 @@ from pipelines.estimation.least_squares import (
     Flags,
     Solution,
     Statistics,
-    Triangles,
+    by_blocks,
     convergence,
     errors,
     fit,
@@ -67,13 +66,13 @@ class Stacked:
 
     def __init__(self, logs: Sequence[Iterable[Block]]) -> None:
         self.logs = logs
-        self._kept: list[Block] | None = []
+        self._kept: list[Block] = []
 
     def __iter__(self) -> Iterator[Block]:
         if self._kept:
             yield from self._kept
             return
-        kept, size = [], 0
+        kept, size = list[Block](), 0
         for log in self.logs:
             for block in log:
                 size += sum(v.nbytes for v in block.values)
@@ -82,7 +81,12 @@ class Stacked:
                 else:
                     kept.clear()
                 yield block
-        self._kept = kept if size <= _KEPT else None
+        self._kept = kept
+
+    @property
+    def of_logs(self) -> list[LogEquations]:
+        """The equations of each log."""
+        return [one for one in self.logs if isinstance(one, LogEquations)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,31 +123,29 @@ class Estimate:
     @cached_property
     def trusted(self) -> Flags:
         """(k,) whether the logs determine the parameter; any other is the smallest that fits."""
-        lost = set(self.unresolved.parameters)
+        lost = self.unresolved.parameters
         kept = [column.name not in lost for column in self.columns.names]
         return np.asarray(kept & self.solution.determined)
 
-    @cached_property
+    @property
     def condition_number(self) -> float:
         """Of Φ in (13): rigid columns, unweighted, SI."""
         return condition_number(self.statistics, self.columns.rigid)
 
     def convergence(self) -> Convergence:
         """Return how the estimates settle as samples come in, Fig. 12."""
-        parts = _CONFIG.parts
-        blocks = split(self.equations, max(1, self.statistics.samples // parts))
-        inflation = self.robust.inflation
-        return convergence(gather_growing(blocks, parts), self.solution, inflation)
+        blocks = split(self.equations, max(1, self.statistics.samples // _CONFIG.parts))
+        parts = gather_growing(blocks, _CONFIG.parts)
+        return convergence(parts, self.solution, self.robust.inflation)
 
 
 def estimate(logs: Sequence[Iterable[Block]], columns: Columns, weighted: bool = True) -> Estimate:
     """Fit the equations of `logs`; without `weighted` every joint counts alike, as in eq. (15)."""
     stacked = Stacked(logs)
     weights = None if weighted else np.ones(columns.body.robot.n_joints)
-    fitted = fit(stacked, weights=weights, gram=gather(stacked))
-    solution = fitted.solution
-    robust = robust_covariance(stacked, solution, fitted.statistics.longest)
-    return Estimate(columns, solution, robust, fitted.statistics, stacked)
+    fitted = fit(stacked, weights=weights)
+    robust = robust_covariance(stacked, fitted.solution, fitted.statistics.longest)
+    return Estimate(columns, fitted.solution, robust, fitted.statistics, stacked)
 
 
 @dataclass(frozen=True)
@@ -173,10 +175,6 @@ class Fitted:
     errors: Errors  # on the logs that were fitted
     weighted: bool  # joints by their own residual
 
-    @property
-    def cutoff_hz(self) -> float | None:
-        return self.recipe.cutoff_hz
-
 
 @dataclass(frozen=True, eq=False)
 class Judged:
@@ -188,24 +186,12 @@ class Judged:
     equations: tuple[LogEquations, ...]  # that judge; none where blocks of the fitted logs do
 
 
-class EquationSettings(Protocol):
-    """The settings that stages share which make equations of logs; None where left open."""
+def refuse_strange(given: Any) -> None:
+    """C02: a number that no log can be done with, before any log is opened.
 
-    @property
-    def cutoff_hz(self) -> float | None: ...
-
-    @property
-    def decimate(self) -> int | None: ...
-
-    @property
-    def min_speed(self) -> tuple[float, ...]: ...
-
-    @property
-    def blocks(self) -> int: ...
-
-
-def refuse_strange(given: EquationSettings) -> None:
-    """C02: a number that no log can be done with, before any log is opened."""
+    Args:
+        given: settings with `blocks`, `min_speed`, `decimate` and `cutoff_hz`.
+    """
     if given.blocks < 2:
         words = "1 block" if given.blocks == 1 else f"{given.blocks} blocks"
         raise UsageError("C02", words, "--blocks", "give 2 or more")
@@ -220,7 +206,7 @@ def refuse_strange(given: EquationSettings) -> None:
         raise UsageError("C02", words, "--cutoff-hz", "give a frequency above 0")
 
 
-def refuse_unfit(given: EquationSettings, log: ExperimentLog) -> None:
+def refuse_unfit(given: Any, log: ExperimentLog) -> None:
     """C02: what no log of this rate and so many joints can be done with."""
     if len(given.min_speed) not in (1, log.n_joints):
         words = f"{len(given.min_speed)} values for {log.n_joints} joints"
@@ -242,12 +228,9 @@ def refuse_leak(
     for log in judging:
         if (same := seen.get(log.q.tobytes() + log.tau.tobytes())) is not None:
             roles = f"{same.role} and {log.role}"
-            raise InputRejected(
-                "D14",
-                f"leak: {same.name} and {log.name} hold the same samples with roles {roles}",
-                where=log.source or log.name,
-                remedy=f"judge on another recording{way_out}",
-            )
+            words = f"leak: {same.name} and {log.name} hold the same samples with roles {roles}"
+            remedy = f"judge on another recording{way_out}"
+            raise InputRejected("D14", words, log.source or log.name, remedy)
 
 
 def motions_of(logs: Sequence[ExperimentLog], how: Reconstruction) -> Motions:
@@ -302,13 +285,12 @@ def equations_of(
 
 def none_left(log: ExperimentLog, found: Reconstructed, few: bool = False) -> InputRejected:
     """Return the refusal of a log of which no sample is left, or so `few` that no row is."""
-    saturated = bool(found.good.saturated.any(axis=1).mean() > _CONFIG.mostly)
-    what = "saturated torque" if saturated else "what is missing or spoilt"
-    words = f"no sample is left: {what} touches {'nearly every one' if few else 'every one'}"
-    remedy = "'rrrid inspect' shows what is wrong; record again"
-    if saturated:
-        remedy = "drive it more gently"
-    return InputRejected("D05" if saturated else "T04", words, log.source or log.name, remedy)
+    where, touched = log.source or log.name, f"touches {'nearly every one' if few else 'every one'}"
+    if found.good.saturated.any(axis=1).mean() > _CONFIG.mostly:
+        words = f"no sample is left: saturated torque {touched}"
+        return InputRejected("D05", words, where, "drive it more gently")
+    words = f"no sample is left: what is missing or spoilt {touched}"
+    return InputRejected("T04", words, where, "'rrrid inspect' shows what is wrong; record again")
 
 
 def refuse_too_few(
@@ -323,9 +305,10 @@ def refuse_too_few(
         InputRejected: T08, too few equations are left for a fit, in all or of a joint.
     """
     log = motions[0][0]
-    where = log.source or log.name
     limit = np.max([one.conditioning.min_speed for one in equations], axis=0)
     slow = np.all([one.rows.slow.all(axis=0) for one in equations], axis=0) & (limit > 0.0)
+    counts = np.sum([one.counts * one.repeats for one in equations], axis=0)
+    j = int(np.argmin(counts))
     if slow.any():
         j = int(np.argmax(slow))
         speeds = [np.abs(found.motion.dq[found.good.kept, j]).max() for _, found in motions]
@@ -333,17 +316,15 @@ def refuse_too_few(
         words = f"no equation of joint {j + 1} is left: its largest speed is {max(speeds):.3g} "
         words += f"{unit}, --min-speed asks for {limit[j]:g}"
         remedy = "give less; one value a joint, where their speeds differ"
-        raise InputRejected("T08", words, where, remedy)
-    counts = np.sum([one.counts * one.repeats for one in equations], axis=0)
-    j = int(np.argmin(counts))
-    if counts[j] < _CONFIG.fewest_of_joint:
+    elif counts[j] < _CONFIG.fewest_of_joint:
         words = f"{counts[j]:.0f} equations of joint {j + 1} are left"
         remedy = "lower --min-speed or --decimate, or record longer"
-        raise InputRejected("T08", words, where, remedy)
-    if counts.sum() < fewest:
+    elif counts.sum() < fewest:
         words = f"{counts.sum():.0f} equations are left, too few for a fit"
         remedy = "lower --decimate, filter higher with --cutoff-hz, or record longer"
-        raise InputRejected("T08", words, where, remedy)
+    else:
+        return
+    raise InputRejected("T08", words, log.source or log.name, remedy)
 
 
 def fit_logs(
@@ -371,20 +352,20 @@ def judge(
 ) -> Judged:
     """Return held-out errors: on other logs, or on blocks of the fitted ones without others."""
     found = fitted.estimate
-    if not motions:
-        own = [one for one in found.equations.logs if isinstance(one, LogEquations)]
-        left = by_blocks(
-            found.equations,
-            found.statistics.samples,
-            blocks,
-            max(one.guard for one in own),
-            triangles=isinstance(found.statistics, Triangles),
-            weighted=fitted.weighted,
-        )
-        return Judged(_of_whole_torque(left, own), "blocks", (), ())
-    equations = equations_of(motions, fitted.recipe, found.columns, rows)
-    left = errors(gather(Stacked(equations)), found.beta)
-    return Judged(_of_whole_torque(left, equations), "logs", motions, tuple(equations))
+    if motions:
+        equations = equations_of(motions, fitted.recipe, found.columns, rows)
+        left = errors(gather(Stacked(equations)), found.beta)
+        return Judged(_of_whole_torque(left, equations), "logs", motions, tuple(equations))
+    own = found.equations.of_logs
+    left = by_blocks(
+        found.equations,
+        found.statistics.samples,
+        blocks,
+        max(one.guard for one in own),
+        triangles=found.statistics.triangular,
+        weighted=fitted.weighted,
+    )
+    return Judged(_of_whole_torque(left, own), "blocks", (), ())
 
 
 def _of_whole_torque(found: Errors, equations: Sequence[LogEquations]) -> Errors:

@@ -22,12 +22,12 @@ import numpy as np
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Motion
 from pipelines.effects.base import ArmModel, Effect, FrictionLaw, Quantity, adds
+from pipelines.estimation.nominal import arm_of
 from pipelines.estimation.nominal_fit import (
     Fit,
     effect_rows,
     law_rows,
     law_slopes,
-    nominal_arm,
     rigid_rows,
     several_rows,
 )
@@ -85,7 +85,7 @@ class NominalArm:
 
     @cached_property
     def arm(self) -> Arm:
-        return nominal_arm(self.columns, self.beta)
+        return arm_of(self.columns, self.beta)
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,19 +33,14 @@ class Unresolved:
 
     def told(self, called: Mapping[str, str]) -> str:
         """Return a sentence, each parameter by its name in `called`, or by its own."""
-
-        def words(names: Sequence[str]) -> list[str]:
-            return [called.get(name, name) for name in names]
-
         said = []
         if self.never_moved:
-            said.append(f"no sample shows {', '.join(words(self.never_moved))}")
-        for *group, last in map(words, self.confused):
-            said.append(
-                f"{', '.join(group)} and {last} cannot be separated"
-                if group
-                else f"{last} is lost in the noise"
-            )
+            never = ", ".join(called.get(name, name) for name in self.never_moved)
+            said.append(f"no sample shows {never}")
+        for names in self.confused:
+            *group, last = (called.get(name, name) for name in names)
+            together = f"{', '.join(group)} and {last} cannot be separated"
+            said.append(together if group else f"{last} is lost in the noise")
         return "; ".join(said)
 
 
@@ -74,17 +69,15 @@ def unresolved(solution: Solution, names: Sequence[str], inflation: float = 1.0)
     """Return what cannot be seen: zero columns, and groups of columns that only show together."""
     lost = solution.directions[~_resolved(solution, inflation)]
     involved = np.flatnonzero(np.any(np.abs(lost) > _CONFIG.involved, axis=0)).tolist()
-    alone, groups = list[int](), list[list[int]]()
+    groups = []
     for vector in _sparse(lost):
         weights = np.abs(vector)
-        group = np.flatnonzero(weights > _CONFIG.named * weights.max()).tolist()
-        if len(group) == 1 and not solution.acting[group[0]]:
-            alone += group
-        else:
-            groups.append(group)
+        groups.append(np.flatnonzero(weights > _CONFIG.named * weights.max()).tolist())
+    alone = [g[0] for g in groups if len(g) == 1 and not solution.acting[g[0]]]
+    confused = sorted(group for group in groups if len(group) > 1 or group[0] not in alone)
     return Unresolved(
         tuple(names[k] for k in sorted(alone)),
-        tuple(tuple(names[k] for k in group) for group in sorted(groups)),
+        tuple(tuple(names[k] for k in group) for group in confused),
         tuple(names[k] for k in involved),
     )
 
@@ -137,7 +130,7 @@ def not_separated(
 def typical_size(value: Array, std: Array, groups: Sequence[str]) -> Array:
     """Return for each parameter the rms of those of its group that stand out of their noise."""
     typical = np.zeros(len(value))
-    sure = np.isfinite(std) & (np.abs(value) > _CONFIG.sure * std)
+    sure = visible(value, std)
     for group in set(groups):
         members = np.array([other == group for other in groups])
         known = value[members & sure]
@@ -145,13 +138,11 @@ def typical_size(value: Array, std: Array, groups: Sequence[str]) -> Array:
     return typical
 
 
-def visible(value: Array, std: Array, typical: Array | None = None) -> Flags:
+def visible(value: Array, std: Array, typical: Array | float = 0.0) -> Flags:
     """Return whether each parameter's value is known to a third, or known to be small.
 
     |value| > 3 std, or std ≤ 5 % of `typical`, the size of its like: a parameter that is truly zero
     never stands out of its noise, and is yet well known where that noise is small.
     """
     known: Flags = np.isfinite(std) & (np.abs(value) > _CONFIG.sure * std)
-    if typical is not None:
-        known |= (typical > 0.0) & (std <= _CONFIG.small * typical)
-    return known
+    return known | ((np.asarray(typical) > 0.0) & (std <= _CONFIG.small * np.asarray(typical)))

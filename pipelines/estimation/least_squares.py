@@ -3,28 +3,24 @@
     fitted = fit(equations)                     equations: anything that can be iterated over again
     fitted.solution.beta, .covariance
     errors(held_out_statistics, beta)           how the same numbers do on other samples
+    by_blocks(equations, ...)                   errors of blocks of time, held out in turn
 
-Equations y = A β arrive in blocks, each output channel with the columns that act on it. A block is
-a stretch of consecutive samples. Noise is taken to be stationary in each channel, and stretches to
-be independent of each other, so a block should be long against the memory of the noise.
+Equations y = A β arrive in blocks of consecutive samples, each output channel with the columns that
+act on it. Of all samples one small matrix for each channel remains (`Statistics`): [A y]ᵀ[A y],
+fast, which loses the square of the condition number; or, where that exceeds 1e4, R of [A y] = Q R,
+by QR of one block on top of the last R (TSQR; Demmel et al. 2012, section 2.2). Channels stay
+apart, so that their weights can change without reading a sample again.
 
-Kostić et al. 2004, eq. (12)-(15), with every channel weighted by its own residual. Normal equations
-with unit columns; where their condition number exceeds 1e4 the stream is read again into triangular
-factors, which lose half as many digits. Of all samples one small matrix for each channel remains:
-
-    Gram         [A y]ᵀ [A y], by adding products: fast, loses the square of the condition number
-    Triangles    R of [A y] = Q R, by QR of one block on top of the last R (TSQR; Demmel et al.
-                 2012, section 2.2): loses the condition number only
-
-Channels stay apart, so that their weights can change without reading a sample again; two of a kind
-add up to that of all samples.
+Kostić et al. 2004, eq. (12)-(15), with every channel weighted by its own residual.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from functools import cached_property, reduce
+from itertools import accumulate, pairwise
+from operator import add
 
 import numpy as np
 import numpy.typing as npt
@@ -35,11 +31,13 @@ Indices = npt.NDArray[np.intp]
 Flags = npt.NDArray[np.bool_]
 
 _CONDITION = 1e4  # numerics: above it normal equations leave fewer than eight digits
+_FLOOR = {False: 3e-8, True: 1e-13}  # numerics: singular values of unit columns that are rounding
 _ROUNDS = 20  # numerics
 _SETTLED = 1e-6  # numerics: relative change of the weights: a thousandth of what noise leaves
 _LOST = 1e-6  # numerics: a share of a lost direction that is not rounding itself
 _LEAST_SIGMA = 1e-6  # numerics: of the signal: below it a residual is rounding
-_FLOOR = 1e-10  # numerics: smallest eigenvalue, of unit columns, of a part that can be solved
+_ENOUGH = 1e5  # numerics: condition from which samples do not tell all parameters yet
+_ASIDE = 8  # numerics: of the shortest logs an eighth is left out at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +52,6 @@ class Block:
     used: tuple[Flags, ...] | None = None
 
     @property
-    def channels(self) -> int:
-        return len(self.y)
-
-    @property
     def samples(self) -> int:
         return len(self.y[0])
 
@@ -65,29 +59,23 @@ class Block:
     def counts(self) -> Indices:
         """(channels,) equations that count."""
         if self.used is None:
-            return np.full(self.channels, self.samples)
+            return np.full(len(self.y), self.samples)
         return np.array([np.count_nonzero(used) for used in self.used])
 
     @classmethod
     def of(cls, Y: Array, y: Array) -> Block:
         """Return the block of Y (samples, channels, parameters) and y (samples, channels).
 
-        What is zero throughout the block is left out; views where columns are a run.
+        What is zero throughout the block is left out.
         """
-        acting: Flags = np.asarray(Y.any(axis=0))
-        columns = tuple(np.flatnonzero(row) for row in acting)
-        tables = Y.transpose(1, 2, 0)
-        values = []
-        for table, index in zip(tables, columns, strict=True):
-            run = len(index) and index[-1] - index[0] == len(index) - 1
-            values.append(table[index[0] : index[-1] + 1] if run else table[index])
-        return cls(Y.shape[2], columns, tuple(values), tuple(y.T))
+        columns = tuple(np.flatnonzero(row) for row in np.asarray(Y.any(axis=0)))
+        tables = zip(Y.transpose(1, 2, 0), columns, strict=True)
+        return cls(Y.shape[2], columns, tuple(table[index] for table, index in tables), tuple(y.T))
 
     def part(self, rows: slice) -> Block:
         """Return some consecutive samples of the block."""
-        values = tuple(v[:, rows] for v in self.values)
+        values, y = tuple(v[:, rows] for v in self.values), tuple(y[rows] for y in self.y)
         used = self.used and tuple(used[rows] for used in self.used)
-        y = tuple(y[rows] for y in self.y)
         return Block(self.width, self.columns, values, y, used)
 
     def residual(self, beta: Array) -> Array:
@@ -104,193 +92,134 @@ def split(equations: Iterable[Block], samples: int) -> Iterator[Block]:
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrum:
-    """The weighted equations as U S V with columns of unit length."""
+class Statistics:
+    """What remains of equations; of two streams it adds up. The last column is that of y."""
 
-    scale: Array  # (k,) length of each column; 1 where it is empty
-    singular_values: Array  # (k,) falling
-    directions: Array  # (k, k) V, one direction a row
-    projections: Array  # (k,) Uᵀ y
-
-
-@dataclass(frozen=True, eq=False)
-class Gram:
-    """Sums of products. The last row and column are those of y."""
-
-    gram: Array  # (channels, k + 1, k + 1)
+    table: Array  # (channels, k + 1, k + 1) [A y]ᵀ[A y] of each channel, or its R
     counts: Indices  # (channels,) equations
     samples: int
     longest: int  # samples of the longest block
-    floor: float = 3e-8  # singular values below this, of unit columns, are rounding
+    triangular: bool = False  # the table holds R
+
+    def __add__(self, other: Statistics) -> Statistics:
+        table = self.table + other.table
+        if self.triangular:
+            both = np.concatenate([self.table, other.table], axis=1)
+            table = np.asarray(np.linalg.qr(both, mode="r"))
+        longest, samples = max(self.longest, other.longest), self.samples + other.samples
+        return Statistics(table, self.counts + other.counts, samples, longest, self.triangular)
+
+    @cached_property
+    def gram(self) -> Array:
+        """(channels, k + 1, k + 1) [A y]ᵀ[A y]."""
+        if not self.triangular:
+            return self.table
+        return np.asarray(self.table.transpose(0, 2, 1) @ self.table)
 
     @property
     def power(self) -> Array:
-        """Σ y² of each channel."""
+        """(channels,) Σ y²."""
         return self.gram[:, -1, -1]
 
-    def __add__(self, other: Gram) -> Gram:
-        counts, samples = self.counts + other.counts, self.samples + other.samples
-        return Gram(self.gram + other.gram, counts, samples, max(self.longest, other.longest))
-
-    def information(self) -> Array:
-        """Return AᵀA of each channel (channels, k, k)."""
-        return self.gram[:, :-1, :-1]
+    @property
+    def floor(self) -> float:
+        """Of columns of unit length, singular values that are rounding."""
+        return _FLOOR[self.triangular]
 
     def root(self, weights: Array) -> Array:
-        """Return a square matrix F with FᵀF = Σ w_j [A y]ᵀ[A y], found with unit columns."""
-        total = np.tensordot(weights, self.gram, 1)
+        """Return a matrix F (…, k + 1) with FᵀF = Σ w_j [A y]ᵀ[A y], found with unit columns."""
+        if self.triangular:
+            stack = np.sqrt(weights)[:, None, None] * self.table
+            return np.asarray(np.linalg.qr(stack.reshape(-1, stack.shape[2]), mode="r"))
+        total = np.tensordot(weights, self.table, 1)
         scale = _unit(np.sqrt(np.diag(total)))
         values, vectors = np.linalg.eigh(total / scale / scale[:, None])
         return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * scale)
 
-    def spectrum(self, weights: Array) -> Spectrum:
-        """Return singular values as roots of eigenvalues, which keep half the digits."""
-        total = np.tensordot(weights, self.gram, 1)
-        scale = _unit(np.sqrt(np.diag(total)[:-1]))
-        values, vectors = np.linalg.eigh(total[:-1, :-1] / scale / scale[:, None])
-        s, v = np.sqrt(np.maximum(values[::-1], 0.0)), vectors.T[::-1]
-        return Spectrum(scale, s, v, v @ (total[:-1, -1] / scale) / _unit(s))
-
     def rss(self, beta: Array) -> Array:
-        """Return ‖y - A β‖² of each channel; below 1e-15 of its power it may be zero."""
+        """Return ‖y - A β‖² of each channel; of sums below 1e-15 of its power it may be zero."""
         v = np.append(-beta, 1.0)
-        return np.asarray(np.maximum(self.gram @ v @ v, 0.0))
-
-
-@dataclass(frozen=True, eq=False)
-class Triangles:
-    """Triangular factors. The last column is that of y. Methods as of `Gram`."""
-
-    factor: Array  # (channels, k + 1, k + 1)
-    counts: Indices  # (channels,) equations
-    samples: int
-    longest: int
-    floor: float = 1e-13
-
-    @property
-    def power(self) -> Array:
-        return np.asarray(np.square(self.factor[:, :, -1]).sum(axis=1))
-
-    def __add__(self, other: Triangles) -> Triangles:
-        both = np.linalg.qr(np.concatenate([self.factor, other.factor], axis=1), mode="r")
-        counts, samples = self.counts + other.counts, self.samples + other.samples
-        return Triangles(np.asarray(both), counts, samples, max(self.longest, other.longest))
-
-    def information(self) -> Array:
-        a = self.factor[:, :, :-1]
-        return np.asarray(a.transpose(0, 2, 1) @ a)
-
-    def root(self, weights: Array) -> Array:
-        stack = np.sqrt(weights)[:, None, None] * self.factor
-        return np.asarray(np.linalg.qr(stack.reshape(-1, stack.shape[2]), mode="r"))
-
-    def spectrum(self, weights: Array) -> Spectrum:
-        root = self.root(weights)
-        scale = _unit(np.linalg.norm(root[:, :-1], axis=0))
-        u, s, v = np.linalg.svd(root[:, :-1] / scale, full_matrices=False)
-        return Spectrum(scale, s, v, u.T @ root[:, -1])
-
-    def rss(self, beta: Array) -> Array:
-        return np.asarray(np.square(self.factor @ np.append(-beta, 1.0)).sum(axis=1))
-
-
-Statistics = Gram | Triangles
+        if self.triangular:
+            return np.asarray(np.square(self.table @ v).sum(axis=1))
+        return np.asarray(np.maximum(self.table @ v @ v, 0.0))
 
 
 def _unit(lengths: Array) -> Array:
     return np.where(lengths > 0.0, lengths, 1.0)
 
 
-class _Adder:
-    """Adds the products of blocks up, each channel over its own columns only."""
+def gather(equations: Iterable[Block]) -> Statistics:
+    """Return the sums of products of all blocks, in one pass, memory constant in their number."""
 
-    def __init__(self, block: Block) -> None:
-        self.total = np.zeros((block.channels, block.width + 1, block.width + 1))
-        self.counts = np.zeros(block.channels, dtype=np.intp)
-        self.samples = self.longest = 0
-        self.columns: tuple[Indices, ...] = ()
-        self.places: list[tuple[Indices, Indices]] = []
+    def take(total: Array, index: Indices, a: Array, y: Array) -> None:
+        total[index[:, None], index] += a @ a.T
+        total[index, -1] += a @ y
+        total[-1, -1] += y @ y
 
-    def add(self, block: Block) -> None:
-        if block.columns is not self.columns:
-            self.columns = block.columns
-            self.places = [(index[:, None], index) for index in block.columns]
-        channels = zip(self.total, self.places, block.values, block.y, strict=True)
-        for total, (down, across), a, y in channels:
-            total[down, across] += a @ a.T
-            total[across, -1] += a @ y
-            total[-1, -1] += y @ y
-        self.counts += block.counts
-        self.samples += block.samples
-        self.longest = max(self.longest, block.samples)
-
-    def gram(self) -> Gram:
-        self.total[:, -1, :-1] = self.total[:, :-1, -1]
-        return Gram(self.total, self.counts, self.samples, self.longest)
+    found = _collected(equations, take)
+    found.table[:, -1, :-1] = found.table[:, :-1, -1]
+    return found
 
 
-def gather(equations: Iterable[Block]) -> Gram:
-    """Return the Gram matrices of all blocks, in one pass, memory constant in their number."""
-    adder: _Adder | None = None
+def triangulate(equations: Iterable[Block]) -> Statistics:
+    """Return the triangular factors of all blocks, in one pass, memory constant in their number."""
+
+    def take(r: Array, index: Indices, a: Array, y: Array) -> None:
+        acting = np.union1d(np.flatnonzero(r[:, :-1].any(axis=0)), index)
+        used = np.append(acting, len(r) - 1)
+        stack = np.zeros((len(used) + len(y), len(used)))
+        stack[: len(used)] = r[: len(used), used]
+        stack[len(used) :, np.searchsorted(used, index)] = a.T
+        stack[len(used) :, -1] = y
+        small = np.linalg.qr(stack, mode="r")
+        r[:] = 0.0
+        r[: len(small), used] = small
+
+    return _collected(equations, take, triangular=True)
+
+
+def _collected(
+    equations: Iterable[Block],
+    take: Callable[[Array, Indices, Array, Array], None],
+    triangular: bool = False,
+) -> Statistics:
+    """Return the tables (k + 1, k + 1) into which `take` has put every channel of every block."""
+    table = np.zeros((0, 0, 0))
+    counts = np.zeros(0, dtype=np.intp)
+    samples = longest = 0
     for block in equations:
-        adder = _Adder(block) if adder is None else adder
-        adder.add(block)
-    if adder is None:
+        if not samples:
+            table = np.zeros((len(block.y), block.width + 1, block.width + 1))
+            counts = np.zeros(len(block.y), dtype=np.intp)
+        for channel in zip(table, block.columns, block.values, block.y, strict=True):
+            take(*channel)
+        counts += block.counts
+        samples, longest = samples + block.samples, max(longest, block.samples)
+    if not samples:
         raise ValueError("no equations")
-    return adder.gram()
+    return Statistics(table, counts, samples, longest, triangular)
 
 
-def gather_growing(equations: Iterable[Block], parts: int = 24) -> list[Gram]:
-    """Return the Gram matrices of consecutive parts of one block or more, `parts` to twice as many.
+def gather_growing(equations: Iterable[Block], parts: int = 24) -> list[Statistics]:
+    """Return the sums of consecutive parts of one block or more, `parts` to twice as many.
 
     Neighbouring parts are joined as soon as there are too many, so that memory stays constant.
     """
-    done: list[Gram] = []
-    adder: _Adder | None = None
-    size, held = 1, 0
+    done: list[Statistics] = []
+    size = held = 1
     for block in equations:
-        if adder is None:
-            if len(done) == 2 * parts:
-                done = [a + b for a, b in zip(done[::2], done[1::2], strict=True)]
-                size *= 2
-            adder, held = _Adder(block), 0
-        adder.add(block)
-        held += 1
-        if held == size:
-            done.append(adder.gram())
-            adder = None
-    if adder is not None:
-        done.append(adder.gram())
+        if held < size:
+            done[-1] = done[-1] + gather([block])
+            held += 1
+            continue
+        if len(done) == 2 * parts:
+            done = [a + b for a, b in zip(done[::2], done[1::2], strict=True)]
+            size *= 2
+        done.append(gather([block]))
+        held = 1
     if not done:
         raise ValueError("no equations")
     return done
-
-
-def triangulate(equations: Iterable[Block]) -> Triangles:
-    """Return the triangular factors of all blocks, in one pass, memory constant in their number."""
-    factor: Array | None = None
-    samples = longest = 0
-    counts = np.zeros(0, dtype=np.intp)
-    for block in equations:
-        if factor is None:
-            counts = np.zeros(block.channels, dtype=np.intp)
-            factor = np.zeros((block.channels, block.width + 1, block.width + 1))
-        for r, index, a, y in zip(factor, block.columns, block.values, block.y, strict=True):
-            acting = np.union1d(np.flatnonzero(r[:, :-1].any(axis=0)), index)
-            used = np.append(acting, block.width)
-            stack = np.zeros((len(used) + block.samples, len(used)))
-            stack[: len(used)] = r[: len(used), used]
-            stack[len(used) :, np.searchsorted(used, index)] = a.T
-            stack[len(used) :, -1] = y
-            small = np.linalg.qr(stack, mode="r")
-            r[:] = 0.0
-            r[np.ix_(np.arange(len(small)), used)] = small
-        counts += block.counts
-        samples += block.samples
-        longest = max(longest, block.samples)
-    if factor is None:
-        raise ValueError("no equations")
-    return Triangles(factor, counts, samples, longest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,6 +240,12 @@ class Errors:
         return cls(np.sqrt(rss / some), np.sqrt(power / some), relative, counts, samples)
 
 
+def errors(statistics: Statistics, beta: Array) -> Errors:
+    """Return how well β explains samples, which need not be those that it was fitted to."""
+    rss = statistics.rss(beta)
+    return Errors.of(rss, statistics.power, statistics.counts, statistics.samples)
+
+
 @dataclass(frozen=True, eq=False)
 class Solution:
     """Parameters with what is known of their uncertainty, as far as white noise goes."""
@@ -324,12 +259,11 @@ class Solution:
     freedom: Array  # (channels,) samples less the parameters that the channel determines
     errors: Errors
     scale: Array  # (k,) length of each weighted column; the following are of columns of unit length
-    singular_values: Array  # (k,)
+    singular_values: Array  # (k,) falling
     directions: Array  # (k, k) right singular vectors, one a row
     rank: int  # as far as rounding allows to see; `identifiability` asks what noise allows
     determined: Flags  # (k,) a parameter is outside every direction that is lost to rounding
     acting: Flags  # (k,) any sample shows the parameter at all
-    method: Literal["normal equations", "QR"]
 
     @property
     def std(self) -> Array:
@@ -340,26 +274,25 @@ class Solution:
         """Condition number of the weighted equations with unit columns."""
         if self.rank < len(self.beta):
             return float("inf")
-        return float(self.singular_values[0]) / float(self.singular_values[-1])
+        return float(self.singular_values[0] / self.singular_values[-1])
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
+    """A solution, and what remains of the equations that it solves."""
+
     statistics: Statistics
     solution: Solution
 
 
-def fit(
-    equations: Iterable[Block], *, weights: Array | None = None, gram: Gram | None = None
-) -> Fit:
+def fit(equations: Iterable[Block], *, weights: Array | None = None) -> Fit:
     """Fit `equations`, which are iterated over again where the condition asks for QR.
 
     Args:
         equations: blocks; a list, or an object whose `__iter__` makes them anew.
         weights: of the channels; their own residuals decide where there are none.
-        gram: `gather` of the same equations, where it is known.
     """
-    normal = gather(equations) if gram is None else gram
+    normal = gather(equations)
     solution = solve(normal, weights=weights)
     seen = solution.singular_values[solution.singular_values > 0.0]
     if solution.rank == len(solution.beta) and seen[0] <= _CONDITION * seen[-1]:
@@ -375,24 +308,25 @@ def solve(statistics: Statistics, *, weights: Array | None = None) -> Solution:
     the maximum-likelihood estimate where channels have independent white noise of unknown strength.
     No sample is read.
     """
-    information, rounds = statistics.information(), 0
+    information = statistics.gram[:, :-1, :-1]
     rms = np.sqrt(statistics.power / np.maximum(statistics.counts, 1))
     w = _weights(rms, rms) if weights is None else weights
-    while True:
-        seen = statistics.spectrum(w)
-        keep = seen.singular_values > statistics.floor * np.sqrt(len(seen.scale))
-        inverse = seen.directions[keep] / seen.singular_values[keep, None] / seen.scale
-        beta, bread = seen.projections[keep] @ inverse, inverse.T @ inverse
+    for left in reversed(range(_ROUNDS)):
+        root = statistics.root(w)
+        scale = _unit(np.linalg.norm(root[:, :-1], axis=0))
+        u, s, v = np.linalg.svd(root[:, :-1] / scale, full_matrices=False)
+        keep = s > statistics.floor * np.sqrt(len(scale))
+        inverse = v[keep] / s[keep, None] / scale
+        beta, bread = (u.T @ root[:, -1])[keep] @ inverse, inverse.T @ inverse
         taken = w * np.einsum("jab,ab->j", information, bread)
         freedom = np.maximum(statistics.counts - taken, 1.0)
         sigma = np.sqrt(statistics.rss(beta) / freedom)
         better = _weights(sigma, rms)
-        rounds += 1
         settled = bool(np.all(np.abs(better - w) <= _SETTLED * w))
-        if weights is not None or rounds == _ROUNDS or settled:
+        if weights is not None or settled or not left:
             break
         w = better
-    determined = ~np.any(np.abs(seen.directions[~keep]) > _LOST, axis=0)
+    determined = ~np.any(np.abs(v[~keep]) > _LOST, axis=0)
     covariance = bread @ np.tensordot(np.square(w * sigma), information, 1) @ bread
     covariance[~determined] = covariance[:, ~determined] = np.inf
     return Solution(
@@ -403,26 +337,18 @@ def solve(statistics: Statistics, *, weights: Array | None = None) -> Solution:
         sigma,
         freedom,
         errors(statistics, beta),
-        seen.scale,
-        seen.singular_values,
-        seen.directions,
+        scale,
+        s,
+        v,
         int(keep.sum()),
         determined,
         np.einsum("jkk->k", information) > 0.0,
-        "normal equations" if isinstance(statistics, Gram) else "QR",
     )
-
-
-def errors(statistics: Statistics, beta: Array) -> Errors:
-    """Return how well β explains samples, which need not be those that it was fitted to."""
-    rss = statistics.rss(beta)
-    return Errors.of(rss, statistics.power, statistics.counts, statistics.samples)
 
 
 def _weights(sigma: Array, rms: Array) -> Array:
     """1/σ², but no channel better than rounding."""
-    known = np.maximum(sigma, _LEAST_SIGMA * rms)
-    return 1.0 / np.square(np.where(known > 0.0, known, 1.0))
+    return 1.0 / np.square(_unit(np.maximum(sigma, _LEAST_SIGMA * rms)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -435,7 +361,7 @@ class Convergence:
 
 
 def convergence(
-    parts: Sequence[Gram], solution: Solution, inflation: Array | float = 1.0
+    parts: Sequence[Statistics], solution: Solution, inflation: Array | float = 1.0
 ) -> Convergence:
     """Return the series over the growing sums of consecutive `parts`; no sample is read again.
 
@@ -443,17 +369,66 @@ def convergence(
         solution: of all of them; its weights, and so its noise, hold throughout.
         inflation: (k,) what the residual's memory adds to standard deviations.
     """
-    each = np.stack([part.gram for part in parts])
-    grams = np.cumsum(np.tensordot(solution.weights, each, axes=(0, 1)), axis=0)
-    information, moment = grams[:, :-1, :-1], grams[:, :-1, -1]
-    scale = _unit(np.sqrt(np.einsum("ikk->ik", information)))
-    values, vectors = np.linalg.eigh(information / scale[:, :, None] / scale[:, None, :])
-    enough = values[:, 0] > _FLOOR
-    size = np.sqrt(np.where(enough[:, None], values, 1.0))
-    inverse = vectors / size[:, None, :] / scale[:, :, None]
-    beta = np.einsum("iab,icb,ic->ia", inverse, inverse, moment, optimize=True)
-    unit = np.sqrt(np.mean(solution.weights * np.square(solution.sigma)))
-    std = unit * np.linalg.norm(inverse, axis=2) * inflation
-    beta[~enough], std[~enough] = np.nan, np.nan
-    counts = np.cumsum([part.samples for part in parts])
-    return Convergence(tuple(int(n) for n in counts), beta, std)
+    unit = inflation * np.sqrt(np.mean(solution.weights * np.square(solution.sigma)))
+    samples, beta, std = list[int](), list[Array](), list[Array]()
+    for upto in accumulate(parts, add):
+        found = solve(upto, weights=solution.weights)
+        known = 1.0 if found.condition < _ENOUGH else np.nan
+        samples.append(upto.samples)
+        beta.append(known * found.beta)
+        std.append(known * unit * np.sqrt(np.diag(found.bread)))
+    return Convergence(tuple(samples), np.array(beta), np.array(std))
+
+
+def by_blocks(
+    equations: Iterable[Block],
+    samples: int,
+    blocks: int,
+    guard: int,
+    *,
+    triangles: bool = False,
+    weighted: bool = True,
+) -> Errors:
+    """Hold contiguous blocks out once each: every one explained by parameters of the rest.
+
+    A low-pass spreads the noise of one sample over its neighbours: those next to a block that is
+    held out are left out of the rest (Burman, Chow & Nolan 1994). One pass, memory constant: every
+    part of the time leaves one small matrix, and those of any rest are sums.
+
+    Args:
+        samples: of all equations.
+        guard: equations on either side of a block that have no part in its parameters.
+        triangles: by QR, as a fit of bad condition is.
+        weighted: joints by their own residual; all alike without.
+    """
+    edges = np.linspace(0, samples, min(blocks, samples) + 1).astype(np.intp)
+    guard = min(guard, samples // _ASIDE)
+    cuts = np.unique(np.clip(np.concatenate([edges - guard, edges, edges + guard]), 0, samples))
+    parts = _between(equations, cuts, triangulate if triangles else gather)
+    rss, power = [], []
+    for first, last in pairwise(edges.tolist()):
+        inside = (cuts[:-1] >= first) & (cuts[1:] <= last)
+        near = (cuts[:-1] >= first - guard) & (cuts[1:] <= last + guard)
+        held = reduce(add, [part for part, own in zip(parts, inside, strict=True) if own])
+        rest = reduce(add, [part for part, own in zip(parts, near, strict=True) if not own])
+        weights = None if weighted else np.ones(len(rest.power))
+        rss.append(held.rss(solve(rest, weights=weights).beta))
+        power.append(held.power)
+    counts = reduce(add, parts).counts
+    return Errors.of(np.sum(rss, axis=0), np.sum(power, axis=0), counts, samples)
+
+
+def _between(
+    equations: Iterable[Block], cuts: Indices, collect: Callable[[list[Block]], Statistics]
+) -> list[Statistics]:
+    """Return what remains between every two cuts, counted in equations from the first on."""
+    found: dict[int, Statistics] = {}
+    done = 0
+    for block in equations:
+        inside = cuts[(cuts > done) & (cuts < done + block.samples)] - done
+        for first, last in pairwise([0, *inside.tolist(), block.samples]):
+            place = int(np.searchsorted(cuts, done + first, side="right"))
+            part = collect([block.part(slice(first, last))])
+            found[place] = found[place] + part if place in found else part
+        done += block.samples
+    return list(found.values())

@@ -16,6 +16,7 @@ from pipelines.effects.base import Effect, FrictionLaw, everywhere
 from pipelines.errors import UsageError
 from pipelines.estimation.estimate import Estimate
 from pipelines.estimation.regression import Columns
+from pipelines.io.log import Array
 from pipelines.io.robot import RobotDescription
 
 _SEED, _STATES = 20040509, 400  # numerics
@@ -86,8 +87,43 @@ def with_offsets(columns: Columns) -> Columns:
     return replace(columns, laws=tuple(laws.values()))
 
 
+def arm_of(
+    columns: Columns,
+    beta: Array,
+    name: str = "nominal",
+    std: Sequence[float | None] | None = None,
+    visible: Sequence[bool] | None = None,
+    friction: Sequence[Acting] = (),
+) -> Arm:
+    """Return the arm of numbers `beta`: friction laws as friction, the rest of the laws as effects.
+
+    Args:
+        std, visible: of each number; None: not known, and all visible.
+        friction: of a given model, beside the laws of the columns.
+    """
+    body, revolute = columns.body, columns.body.robot.revolute
+    std = [None] * len(beta) if std is None else std
+    visible = [True] * len(beta) if visible is None else visible
+    place = {i: k for k, i in enumerate(columns.kept)}
+    base = []
+    for i, p in enumerate(body.parameters):
+        if (k := place.get(i)) is None:
+            base.append(Parameter(p.name, 0.0, None, p.unit, origin="assumed"))
+        else:
+            value, seen = float(beta[k]), bool(visible[k])
+            base.append(Parameter(p.name, value, std[k], p.unit, origin="fitted", visible=seen))
+    laws, effects = list(friction), list[Acting]()
+    for law, part in zip(columns.laws, columns.parts, strict=True):
+        amplitudes = (q.name for q in law.parameters if not q.shape)
+        known = {n: s for n, s in zip(amplitudes, std[part], strict=True) if s is not None}
+        turns = law.joint is None or revolute[law.joint - 1]
+        acting = Acting.of(law, law.values(beta[part]), known, revolute=turns)
+        (laws if isinstance(law, FrictionLaw) else effects).append(acting)
+    return Arm(name, body, tuple(base), tuple(laws), tuple(effects))
+
+
 def fitted_arm(found: Estimate, name: str, friction: Sequence[Acting] = ()) -> Arm:
-    """Return the arm of an estimate: friction laws as friction, the rest of the laws as effects.
+    """Return the arm of an estimate, with the covariance of its numbers.
 
     What the logs do not determine has no standard deviation; its value is the smallest that
     explains them, and predicts the torque of motions like theirs.
@@ -95,34 +131,12 @@ def fitted_arm(found: Estimate, name: str, friction: Sequence[Acting] = ()) -> A
     Args:
         friction: of a given model, where the fit took it as known.
     """
-    columns, beta, body = found.columns, found.beta, found.columns.body
-    pairs = zip(found.std, found.trusted, strict=True)
-    std = [float(s) if sure else None for s, sure in pairs]
-    place = {i: k for k, i in enumerate(columns.kept)}
-    base = []
-    for i, known in enumerate(body.parameters):
-        if i in place:
-            k = place[i]
-            value, seen = float(beta[k]), bool(found.visible[k])
-            fitted = Parameter(known.name, value, std[k], known.unit, origin="fitted", visible=seen)
-            base.append(fitted)
-        else:
-            base.append(Parameter(known.name, 0.0, None, known.unit, origin="assumed"))
-    laws: list[Acting] = list(friction)
-    effects: list[Acting] = []
-    first = len(columns.kept)
-    for law in columns.laws:
-        amplitudes = [q for q in law.parameters if not q.shape]
-        part = slice(first, first + len(amplitudes))
-        first = part.stop
-        deviations = zip(amplitudes, std[part], strict=True)
-        known_std = {q.name: s for q, s in deviations if s is not None}
-        turns = law.joint is None or body.robot.revolute[law.joint - 1]
-        acting = Acting.of(law, law.values(beta[part]), known_std, revolute=turns)
-        (laws if isinstance(law, FrictionLaw) else effects).append(acting)
+    columns = found.columns
+    pairs = zip(found.std.tolist(), found.trusted, strict=True)
+    std = [s if sure else None for s, sure in pairs]
+    arm = arm_of(columns, found.beta, name, std, found.visible.tolist(), friction)
     names = tuple(column.name for column in columns.names)
-    together = Uncertainty(names, found.robust.covariance)
-    return Arm(name, body, tuple(base), tuple(laws), tuple(effects), together)
+    return replace(arm, uncertainty=Uncertainty(names, found.robust.covariance))
 
 
 def plain_number(value: float, digits: int = 2) -> str:

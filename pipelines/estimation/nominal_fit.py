@@ -16,9 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.dynamics.arm import Acting, Arm
-from pipelines.dynamics.parameter import Parameter
-from pipelines.effects.base import ArmModel, Effect, FrictionLaw, Quantity, plainer
+from pipelines.effects.base import ArmModel, Effect, Quantity, plainer
 from pipelines.estimation.regression import Columns
 from pipelines.estimation.rows import Data
 from pipelines.io.log import Array
@@ -234,25 +232,3 @@ def _best_of_grid(data: Data, law: Effect, columns: Columns, rest: Fit) -> tuple
     shapes = (law, *grid) if plainer(law) else grid
     laid = [(shape, law_rows(data, shape, columns)) for shape in shapes]
     return max(laid, key=lambda one: gain(one[1]))
-
-
-def nominal_arm(columns: Columns, beta: Array) -> Arm:
-    """Return the arm of `beta` of rigid columns and laws; what follows is not used."""
-    place, base = {i: k for k, i in enumerate(columns.kept)}, []
-    for i, p in enumerate(columns.body.parameters):
-        if i in place:
-            value = float(beta[place[i]])
-            base.append(Parameter(p.name, value, None, p.unit, origin="fitted"))
-        else:
-            base.append(Parameter(p.name, 0.0, None, p.unit, origin="assumed"))
-    friction: list[Acting] = []
-    effects: list[Acting] = []
-    first = len(columns.kept)
-    turning = columns.body.robot.revolute
-    for law in columns.laws:
-        count = sum(not q.shape for q in law.parameters)
-        turns = law.joint is None or turning[law.joint - 1]
-        acting = Acting.of(law, law.values(beta[first : first + count]), revolute=turns)
-        first += count
-        (friction if isinstance(law, FrictionLaw) else effects).append(acting)
-    return Arm("nominal", columns.body, tuple(base), tuple(friction), tuple(effects))

@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -38,7 +39,7 @@ from pipelines.estimation.filters import (
     zero_phase,
 )
 from pipelines.estimation.least_squares import Block, Flags, Indices
-from pipelines.estimation.motion import Reconstructed, known_median
+from pipelines.estimation.motion import Reconstructed
 from pipelines.io.limits import GAP_TICKS
 
 _CONFIG = RegressionConfig()
@@ -49,7 +50,7 @@ _SETTLE = 10.0  # numerics: periods of the cut-off after which a low-pass has fo
 
 @dataclass(frozen=True)
 class Conditioning:
-    """The filter and decimation of torque and columns. See `condition` for the defaults."""
+    """The filter and decimation of torque and columns."""
 
     low_pass: LowPass | None
     cutoff_hz: float | None
@@ -169,44 +170,42 @@ class Columns:
         """Places of the rigid columns among all."""
         return range(len(self.kept))
 
+    @cached_property
+    def parts(self) -> tuple[slice, ...]:
+        """Places of the amplitudes of each law among all columns."""
+        counts = (sum(not q.shape for q in law.parameters) for law in self.laws)
+        edges = accumulate(counts, initial=len(self.kept))
+        return tuple(slice(*edge) for edge in pairwise(edges))
+
     def rows(self, motion: Motion) -> tuple[tuple[Array, ...], tuple[Indices, ...]]:
         """Return the columns that act on each joint (columns, samples), and which they are."""
-        values, places = self._rigid_rows(motion)
-        first = len(self.kept)
-        added: list[list[Array]] = [[v] for v in values]
-        where: list[list[int]] = [p.tolist() for p in places]
-        for law in self.laws:
-            table = law.columns(motion, self.arm)
-            joints = range(table.shape[1]) if law.joint is None else (law.joint - 1,)
-            for j in joints:
-                added[j] += list(table[:, j].T)
-                where[j] += range(first, first + table.shape[2])
-            first += table.shape[2]
-        tables = tuple(np.vstack(own) if len(own) > 1 else own[0] for own in added)
-        return tables, tuple(np.array(index, dtype=np.intp) for index in where)
-
-    @cached_property
-    def _acting(self) -> Flags:
-        """(joints, parameters) which columns of the body act on a joint: at random states."""
-        states = np.random.default_rng(_SEED).uniform(-3.0, 3.0, (3, 16, self.body.robot.n_joints))
-        return np.asarray(self.body.regressor(*states).any(axis=0))
-
-    def _rigid_rows(self, motion: Motion) -> tuple[list[Array], list[Indices]]:
         if isinstance(self.body, RRR):
             room = np.empty((28, len(motion.t)))
-            rows = self.body.acting_rows(motion.q, motion.dq, motion.ddq, room)
-            acting = [np.array(columns, dtype=np.intp) for columns in ACTING]
+            rigid = self.body.acting_rows(motion.q, motion.dq, motion.ddq, room)
         else:
             table = self.body.regressor(motion.q, motion.dq, motion.ddq).transpose(1, 2, 0)
-            acting = [np.flatnonzero(row) for row in self._acting]
-            rows = tuple(table[j, index] for j, index in enumerate(acting))
+            rigid = tuple(table[j, index] for j, index in enumerate(self._acting))
         place = np.full(len(self.body.parameters), -1, dtype=np.intp)
         place[list(self.kept)] = np.arange(len(self.kept))
-        keep = [place[index] >= 0 for index in acting]
-        return (
-            [row[k] for row, k in zip(rows, keep, strict=True)],
-            [place[index[k]] for index, k in zip(acting, keep, strict=True)],
-        )
+        laws = zip(self.laws, self.parts, strict=True)
+        added = [(law.joint, law.columns(motion, self.arm), part) for law, part in laws]
+        values, places = [], []
+        for j, (own, index) in enumerate(zip(rigid, self._acting, strict=True)):
+            here = [(table[:, j].T, part) for at, table, part in added if at in (None, j + 1)]
+            keep = place[index] >= 0
+            values.append(np.vstack([own[keep], *(table for table, _ in here)]))
+            numbers = (np.arange(part.start, part.stop) for _, part in here)
+            places.append(np.concatenate([place[index[keep]], *numbers]))
+        return tuple(values), tuple(places)
+
+    @cached_property
+    def _acting(self) -> list[Indices]:
+        """Which columns of the body act on each joint: of an arm of any kind, at random states."""
+        if isinstance(self.body, RRR):
+            return [np.array(columns, dtype=np.intp) for columns in ACTING]
+        states = np.random.default_rng(_SEED).uniform(-3.0, 3.0, (3, 16, self.body.robot.n_joints))
+        seen = np.asarray(self.body.regressor(*states).any(axis=0))
+        return [np.flatnonzero(row) for row in seen]
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,10 +214,6 @@ class Rows:
 
     out: Flags  # (samples,) none: spoilt, vague, or so near to it that the low-pass spreads it here
     slow: Flags  # (samples, joints) none of this joint: too slow, or near torque that may be cut
-
-    def __and__(self, other: Rows) -> Rows:
-        """Return samples that make equations in both."""
-        return Rows(self.out | other.out, self.slow | other.slow)
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,10 +229,17 @@ class LogEquations:
     chosen: Rows | None = None  # instead of the log's own choice: the same for several motions
 
     def __iter__(self) -> Iterator[Block]:
+        how, rate = self.conditioning, 1.0 / self.found.good.log.sample_time
+        margin = 2 if how.cutoff_hz is None else int(np.ceil(_SETTLE * rate / how.cutoff_hz))
         for run in self.runs:
-            for values, y, used in self._pieces(run):
-                if len(y[0]):
-                    yield Block(len(self.columns.names), self._places, values, y, used)
+            edges = [*range(run.start, run.stop, _BLOCK), run.stop]
+            if len(edges) > 2 and edges[-1] - edges[-2] < margin:
+                del edges[-2]  # a short rest joins the stretch before it
+            for first, last in pairwise(edges):
+                wide = slice(max(run.start, first - margin), min(run.stop, last + margin))
+                moments = self._moments(run, first, last)
+                if len(moments):
+                    yield self._block(wide, moments)
 
     @cached_property
     def runs(self) -> tuple[slice, ...]:
@@ -285,12 +287,9 @@ class LogEquations:
 
     @cached_property
     def counts(self) -> Indices:
-        """(joints,) about how many equations there are of each joint, before any is made."""
-        found = np.zeros(self.rows.slow.shape[1], dtype=np.intp)
-        for run in self.runs:
-            thin = slice(run.start, run.stop, self.conditioning.decimation)
-            found += np.sum(~self.rows.out[thin, None] & ~self.rows.slow[thin], axis=0)
-        return found
+        """(joints,) equations there are of each joint."""
+        slow = [self.rows.slow[self._moments(run, run.start, run.stop)] for run in self.runs]
+        return np.asarray(sum(np.sum(~own, axis=0) for own in slow), dtype=np.intp)
 
     @property
     def counted(self) -> tuple[slice, ...]:
@@ -306,11 +305,6 @@ class LogEquations:
         return 1 if self.found.mean is None else self.found.mean.periods
 
     @property
-    def samples(self) -> int:
-        """Moments that make equations of any joint."""
-        return sum(len(self._moments(run)) for run in self.runs)
-
-    @property
     def guard(self) -> int:
         """Equations apart, from which on two share no noise: what a low-pass spreads."""
         how, step = self.conditioning, self.found.good.log.sample_time
@@ -319,65 +313,41 @@ class LogEquations:
 
     def moments(self) -> Indices:
         """Return the sample of the recording of every equation."""
-        every = np.concatenate([self._moments(run) for run in self.runs])
-        return np.asarray(self.found.good.kept[every])
+        every = [self._moments(run, run.start, run.stop) for run in self.runs]
+        return np.asarray(self.found.good.kept[np.concatenate(every)])
 
-    def _moments(self, run: slice) -> Indices:
-        """Return the samples of the mended log that make equations of any joint."""
-        end, every = int(self.held), self.conditioning.decimation
-        moments = np.arange(run.start + end, run.stop - end)[-end % every :: every]
-        return np.asarray(moments[~self.rows.out[moments]])
+    def _moments(self, run: slice, first: int, last: int) -> Indices:
+        """Return the samples first … last - 1 of the mended log that make equations of any joint.
 
-    @cached_property
-    def _places(self) -> tuple[Indices, ...]:
-        start = self.runs[0].start
-        return self.columns.rows(self._motion(slice(start, start + 8)))[1]
+        Of a held command the first and the last of a run have no neighbour to be averaged with.
+        """
+        every, end = self.conditioning.decimation, int(self.held)
+        moments = np.arange(first + (run.start - first) % every, last, every)
+        inside = (moments >= run.start + end) & (moments < run.stop - end)
+        return np.asarray(moments[inside & ~self.rows.out[moments]])
 
-    def _pieces(
-        self, run: slice
-    ) -> Iterator[tuple[tuple[Array, ...], tuple[Array, ...], tuple[Flags, ...] | None]]:
-        """Yield the columns and torque of each joint, and which count, conditioned and thinned."""
-        how, rate = self.conditioning, 1.0 / self.found.good.log.sample_time
-        margin = 2 if how.cutoff_hz is None else int(np.ceil(_SETTLE * rate / how.cutoff_hz))
-        inner = _BLOCK - _BLOCK % how.decimation
-        length = run.stop - run.start
-        for first in range(0, length, inner):
-            last = min(first + inner, length)
-            if length - last < margin:  # a short rest joins the stretch before it
-                last = length
-            begin, end = max(0, first - margin), min(length, last + margin)
-            wide = slice(run.start + begin, run.start + end)
-            yield self._conditioned(wide, run.start + first, run.start + last, -first)
-            if last == length:
-                return
-
-    def _conditioned(
-        self, wide: slice, first: int, last: int, phase: int
-    ) -> tuple[tuple[Array, ...], tuple[Array, ...], tuple[Flags, ...] | None]:
-        how = self.conditioning
+    def _block(self, wide: slice, moments: Indices) -> Block:
+        """Return the equations of `moments`, conditioned with the samples of `wide` around them."""
+        low_pass, begin = self.conditioning.low_pass, int(self.held)
         motion, tau = self.stretch(wide)
-        rows, begin = self.columns.rows(motion)[0], 0
+        rows, places = self.columns.rows(motion)
         known = None if self.known is None else self.known(motion)
-        if self.held:  # the first and the last sample have no neighbour to be averaged with
-            rows, tau, begin = tuple(centre_samples(row.T).T for row in rows), centre_hold(tau), 1
+        if self.held:
+            rows, tau = tuple(centre_samples(row.T).T for row in rows), centre_hold(tau)
             known = None if known is None else centre_samples(known)
         if known is not None:
             tau = tau - known
-        stacks = [np.vstack([row, u]).T for row, u in zip(rows, tau.T, strict=True)]
-        if how.low_pass is not None:
-            stacks = [zero_phase(s, how.low_pass) for s in stacks]
-        inside = np.arange(len(stacks[0])) + wide.start + begin - first - phase % how.decimation
-        span = last - first - phase % how.decimation
-        chosen = np.flatnonzero((inside >= 0) & (inside < span) & (inside % how.decimation == 0))
-        keep = chosen[~self.rows.out[wide][chosen + begin]]
-        slow = self.rows.slow[wide][keep + begin]
-        scale, parts = np.sqrt(self.repeats), []
-        for j, stack in enumerate(stacks):
-            own = stack[keep] if scale == 1.0 else scale * stack[keep]
-            parts.append(np.where(slow[:, j, None], 0.0, own))
-        values = tuple(np.ascontiguousarray(p[:, :-1].T) for p in parts)
-        y = tuple(np.ascontiguousarray(p[:, -1]) for p in parts)
-        return values, y, tuple(~slow.T) if slow.any() else None
+        slow, values, y = self.rows.slow[moments], [], []
+        for row, torque, still in zip(rows, tau.T, slow.T, strict=True):
+            stack = np.vstack([row, torque]).T
+            if low_pass is not None:
+                stack = zero_phase(stack, low_pass)
+            own = np.sqrt(self.repeats) * stack[moments - wide.start - begin].T
+            own = np.ascontiguousarray(np.where(still, 0.0, own))
+            values.append(own[:-1])
+            y.append(own[-1])
+        used = tuple(~slow.T) if slow.any() else None
+        return Block(len(self.columns.names), places, tuple(values), tuple(y), used)
 
     @cached_property
     def _unknown(self) -> Flags:
@@ -386,38 +356,24 @@ class LogEquations:
         finite = np.isfinite(motion.q + motion.dq + motion.ddq)[kept]
         return np.asarray(~finite | self.found.vague[kept])
 
-    @cached_property
-    def _lost(self) -> Flags:
-        """(samples, joints) of the mended log where the position is not known either."""
-        found, kept = self.found, self.found.good.kept
-        lost = ~np.isfinite(found.motion.q)[kept]
-        if found.std is None:
-            return np.ones_like(lost)
-        std = found.std[0][kept]
-        return np.asarray(lost | ~(std <= _CONFIG.lost * known_median(std)))
-
-    def _motion(self, stretch: slice) -> Motion:
-        """Return the motion at the samples of a stretch of the mended log."""
-        rows, m = self.found.good.kept[stretch], self.found.motion
-        return replace(m, t=m.t[rows], q=m.q[rows], dq=m.dq[rows], ddq=m.ddq[rows])
-
     def stretch(self, wide: slice) -> tuple[Motion, Array]:
-        """Return motion and torque with what is spoilt bridged by straight lines."""
-        good, motion = self.found.good, self._motion(wide)
-        tau = good.log.tau[wide]
+        """Return motion and torque at samples of the mended log, straight lines over what is bad.
+
+        Where the acceleration is vague the position need not be: friction with a memory starts from
+        where the joint was.
+        """
+        good, m = self.found.good, self.found.motion
+        rows, unknown = good.kept[wide], self._unknown[wide]
         spoilt = (good.missing | good.spikes | good.saturated)[wide]
-        unknown = self._unknown[wide]
-        if not (spoilt | unknown).any():
-            return motion, tau
-        # where the acceleration is vague the position need not be: friction with a memory starts
-        # from where the joint was
-        q = bridged(motion.q, unknown & self._lost[wide])
-        dq, ddq = (bridged(x, unknown) for x in (motion.dq, motion.ddq))
-        return Motion(motion.t, q, dq, ddq), bridged(tau, spoilt)
+        q = bridged(m.q[rows], ~np.isfinite(m.q[rows]))
+        dq, ddq = (bridged(x[rows], unknown) for x in (m.dq, m.ddq))
+        return replace(m, t=m.t[rows], q=q, dq=dq, ddq=ddq), bridged(good.log.tau[wide], spoilt)
 
 
 def bridged(x: Array, bad: Flags) -> Array:
     """Return `x` (samples, joints) with straight lines where it is bad; 0 of one all bad."""
+    if not bad.any():
+        return x
     out, place = x.copy(), np.arange(len(x))
     for j in np.flatnonzero(bad.any(axis=0)):
         ill = bad[:, j]

@@ -28,7 +28,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pipelines.estimation.bounded import Minimum, least_squares
 from pipelines.frequency.config import GroupingConfig
 from pipelines.frequency.modes import Modes, Pair
 from pipelines.frequency.rational import Known
@@ -334,6 +333,8 @@ def explain(
         inertia_std: relative, of J in each posture; none: exactly known.
         config: what frequencies are granted, and what a base weighs at least.
     """
+    from scipy.optimize import least_squares
+
     config = config or GroupingConfig()
     with_base, with_joint = springs
     count = int(with_base) + int(with_joint)
@@ -367,26 +368,25 @@ def explain(
         light = min(theta[1] - np.log(config.light * np.mean(inertia)), 0.0) / config.granted
         return np.append(off, light)
 
-    def chi_squared(found: Minimum) -> float:
-        return float(found.rest @ found.rest)
-
     starts = [
         [*start, *rotor]
         for start in _starts(pairs[0], inertia[0], springs)
         for rotor in ([[-4.0], [0.0]] if geared else [[]])
     ]
-    best = min((least_squares(rest, np.array(start)) for start in starts), key=chi_squared)
+    best = min(
+        (least_squares(rest, start, x_scale="jac") for start in starts), key=lambda o: o.cost
+    )
     # the rest, not what was granted, says how well the numbers are known
-    weight = np.ones(len(best.rest))
+    weight = np.ones(len(best.fun))
     weight[: std.size] = (granted / np.maximum(std, config.exact)).ravel()
     freedom = std.size - len(best.x)
-    scatter = float(((best.rest * weight) ** 2).sum()) / max(freedom, 1)
-    slope = best.slope * weight[:, None]
+    scatter = float(((best.fun * weight) ** 2).sum()) / max(freedom, 1)
+    slope = best.jac * weight[:, None]
     covariance = np.linalg.pinv(slope.T @ slope)[: 2 * count, : 2 * count] * max(scatter, 1.0)
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    worst = float(np.abs(best.rest[: std.size] * granted.ravel()).max())
+    worst = float(np.abs(best.fun[: std.size] * granted.ravel()).max())
     base, joint, _ = bodies(best.x)
-    return Explained(base, joint, deviations, chi_squared(best), worst, freedom, config)
+    return Explained(base, joint, deviations, 2.0 * float(best.cost), worst, freedom, config)
 
 
 def _starts(first: Sequence[Pair], inertia: float, springs: tuple[bool, bool]) -> list[list[float]]:

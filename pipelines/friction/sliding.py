@@ -30,7 +30,6 @@ import numpy.typing as npt
 
 from pipelines.dynamics.body import Array
 from pipelines.estimation.bootstrap import by_flips
-from pipelines.estimation.bounded import least_between
 from pipelines.estimation.varpro import Linear, held_out
 from pipelines.friction.config import DriftConfig, SlidingConfig
 from pipelines.friction.fit import LawEquations
@@ -77,8 +76,9 @@ def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint) -> Sliding:
         return Sliding(moving, rests, 0.0, np.inf)
     reach = start = float(np.median(travel[moving]))
     slides = travel >= reach
-    while slides.sum() < min(_CONFIG.rows * np.any(columns[slides] != 0.0, axis=0).sum(),
-                             moving.sum()):
+    while slides.sum() < min(
+        _CONFIG.rows * np.any(columns[slides] != 0.0, axis=0).sum(), moving.sum()
+    ):
         reach = start = reach / _CONFIG.halving
         slides = moving & (travel >= reach)
     noise = _noise(columns[slides], y[slides])
@@ -188,14 +188,16 @@ def _fitted(columns: Array, y: Array) -> Linear:
     return Linear(columns, root @ projected, y - basis @ projected, root)
 
 
-def _attenuation(stretches: Sequence[Stretch], columns: Array, slides: Mask,
-                 postures: int) -> float:
+def _attenuation(
+    stretches: Sequence[Stretch], columns: Array, slides: Mask, postures: int
+) -> float:
     """Return the noise variance of (dq(b) - dq(a))/T over that of what no other column holds.
 
     Errors in variables: least squares takes J (1 - that share) for J (Fuller 1987, Section 1.1.1).
     """
-    noise = np.concatenate([2.0 * (stretch.speed_std / stretch.length[stretch.kept]) ** 2
-                            for stretch in stretches])[slides]
+    noise = np.concatenate(
+        [2.0 * (stretch.speed_std / stretch.length[stretch.kept]) ** 2 for stretch in stretches]
+    )[slides]
     width, shares = stretches[0].rigid.shape[1], []
     for k in range(postures):
         own, others = columns[:, width * k], np.delete(columns, width * k, axis=1)
@@ -217,8 +219,12 @@ class _Rows:
 
     def along(self, course: Course) -> Array:
         """Return c(t) of every row (rows,)."""
-        return np.concatenate([course.at(part, stretch.middle[2] - stretch.t[0])
-                               for part, stretch in enumerate(self.stretches)])
+        return np.concatenate(
+            [
+                course.at(part, stretch.middle[2] - stretch.t[0])
+                for part, stretch in enumerate(self.stretches)
+            ]
+        )
 
     def rest(self, fit: Linear) -> Array:
         """Return the residual of every block as the other blocks predict it (rows,)."""
@@ -257,21 +263,28 @@ def drift_of(stretches: Sequence[Stretch], joint: OneJoint) -> Course | None:
     equations = LawEquations.of(stretches, joint)
     speed = np.concatenate([stretch.middle[1] for stretch in stretches])
     curve = _free_curve(speed)
-    rows = _Rows(stretches, speed, curve,
-                 _fitted(np.hstack([equations.fixed, curve]), equations.y), equations.y,
-                 blocks_of_time(stretches, _DRIFT.block))
+    rows = _Rows(
+        stretches,
+        speed,
+        curve,
+        _fitted(np.hstack([equations.fixed, curve]), equations.y),
+        equations.y,
+        blocks_of_time(stretches, _DRIFT.block),
+    )
     few = len(speed) < _DRIFT.rows * rows.steady.root.shape[1]
     if few or rows.blocks.max() + 1 < _DRIFT.fewest:
         return None
-    drifts = [_best(kind, form, rows) for form in ("whole", "coulomb", "viscous")
-              for kind in ("trend", "step")]
+    drifts = [
+        _best(kind, form, rows)
+        for form in ("whole", "coulomb", "viscous")
+        for kind in ("trend", "step")
+    ]
     best = min(drifts, key=lambda drift: float(drift.fit.residual @ drift.fit.residual))
     gains = np.log(rows.held_out(rows.steady) / rows.held_out(best.fit))
-    whole = curve @ best.fit.beta[-1 - curve.shape[1]:-1]
+    whole = curve @ best.fit.beta[-1 - curve.shape[1] : -1]
     least = _DRIFT.least * float(np.median(np.abs(whole)))
     if best.size >= least and by_flips(gains) <= _DRIFT.chance:
-        chosen = next(drift for drift in drifts
-                      if no_worse(drift.fit.residual, best.fit.residual))
+        chosen = next(drift for drift in drifts if no_worse(drift.fit.residual, best.fit.residual))
         return replace(chosen.course, time_std=_time_std(chosen, rows))
     return None
 
@@ -285,7 +298,7 @@ def _best(kind: str, form: str, rows: _Rows) -> _Drift:
     width, last = rows.curve.shape[1], fit.columns.shape[1]
     for _ in range(_DRIFT.rounds if form == "whole" else 1):
         if form == "whole":
-            shape = rows.curve @ fit.beta[last - width:last]
+            shape = rows.curve @ fit.beta[last - width : last]
         course = (_step if kind == "step" else _trend)(form, shape, rows)
         own = rows.along(course) * shape
         fit = _fitted(np.column_stack([rows.steady.columns, own]), rows.y)
@@ -294,6 +307,8 @@ def _best(kind: str, form: str, rows: _Rows) -> _Drift:
 
 def _trend(form: str, shape: Array, rows: _Rows) -> Course:
     """Return the course of a trend with the time constant by which it explains most."""
+    from scipy.optimize import minimize_scalar
+
     duration = max(float(stretch.t[-1] - stretch.t[0]) for stretch in rows.stretches)
 
     def course(logarithm: float) -> Course:
@@ -308,7 +323,9 @@ def _trend(form: str, shape: Array, rows: _Rows) -> Course:
     times = np.log(_DRIFT.times)
     k = int(np.argmin([loss(time) for time in times]))
     low, high = float(times[max(k - 1, 0)]), float(times[min(k + 1, len(times) - 1)])
-    return course(least_between(loss, low, high, FINE))
+    options = {"xatol": FINE}  # Brent 1973
+    found = minimize_scalar(loss, bounds=(low, high), method="bounded", options=options)
+    return course(float(found.x))
 
 
 def _time_std(drift: _Drift, rows: _Rows) -> float | None:

@@ -8,8 +8,6 @@ from scipy.optimize import minimize
 
 from pipelines.estimation.least_squares import (
     Block,
-    Gram,
-    Triangles,
     errors,
     fit,
     gather,
@@ -126,8 +124,7 @@ def test_bad_condition_calls_for_triangles(condition: float, method: str, bar: f
     beta = rng.standard_normal(8)
     Y = a.reshape(1000, 3, 8)
     found = fit([Block.of(Y[k:k + 100], (Y @ beta)[k:k + 100]) for k in range(0, 1000, 100)])
-    assert found.solution.method == method
-    assert isinstance(found.statistics, Gram if method == "normal equations" else Triangles)
+    assert found.statistics.triangular == (method == "QR")
     assert np.linalg.norm(found.solution.beta - beta) <= bar * np.linalg.norm(beta)
     equilibrated = a / np.linalg.norm(a, axis=0)
     assert found.solution.condition == pytest.approx(np.linalg.cond(equilibrated), rel=1e-2)
@@ -138,7 +135,6 @@ def test_units_do_not_matter() -> None:
     one, y = noisy()
     scale = np.geomspace(1e-9, 1e9, WIDTH)
     here, there = (fit([Block.of(Y, y)]).solution for Y in (one.Y, one.Y * scale))
-    assert there.method == here.method
     np.testing.assert_allclose(there.beta * scale, here.beta, rtol=1e-9)
     np.testing.assert_allclose(there.std * scale, here.std, rtol=1e-9)
 

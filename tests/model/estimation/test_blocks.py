@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from pipelines.estimation.held_out import by_blocks
-from pipelines.estimation.least_squares import Block
+from pipelines.estimation.least_squares import Block, by_blocks
 from pipelines.io.log import Array
 from tests.fit.problems import CHANNELS, Problem, problem, white
 from tests.seeds import rarely

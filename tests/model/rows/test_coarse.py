@@ -6,7 +6,8 @@ import numpy as np
 
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.estimation.candidate_columns import families, lay_family, whole_motion
-from pipelines.estimation.nominal_fit import fit_nominal, nominal_arm
+from pipelines.estimation.nominal import arm_of
+from pipelines.estimation.nominal_fit import fit_nominal
 from pipelines.estimation.preparation import Logs, prepare
 from tests.diagnosis.arms import hidden
 
@@ -16,7 +17,7 @@ def test_columns_of_a_search_are_those_of_all_samples_nearly() -> None:
     prepared = prepare(Logs((hidden(1),)), DiagnosisConfig().recipe())
     data = prepared.data
     columns, fit = fit_nominal(data, prepared.columns)
-    arm = nominal_arm(columns, fit.beta)
+    arm = arm_of(columns, fit.beta)
     coarse = data.coarse
     assert len(coarse.logs[0].motion.t) < 0.6 * len(data.logs[0].motion.t)
     np.testing.assert_array_equal(coarse.t, data.t)
