@@ -34,8 +34,7 @@ import numpy as np
 from filterpy.kalman import KalmanFilter
 
 from pipelines.estimation.chain import held_input, transition
-from pipelines.estimation.smoother import smooth
-from pipelines.estimation.state_estimation import Start, design, observe
+from pipelines.estimation.state_estimation import Start, design, observe, smooth
 
 T, STEP = 1e-3, 1e-5
 SIGMA, R = np.array([200.0, 500.0, 3770.0]), STEP**2 / 12

@@ -33,9 +33,8 @@ from pipelines.estimation.estimate import (
 from pipelines.estimation.identifiability import not_separated
 from pipelines.estimation.judgements import REMEDY, negative_viscous
 from pipelines.estimation.mean_period import averaged, doubts, residuals
-from pipelines.estimation.motion import Motions, Reconstructed, for_equations
+from pipelines.estimation.motion import Motions, Reconstructed, Reconstruction, for_equations
 from pipelines.estimation.nominal import columns_in_words, fitted_arm, nominal_columns
-from pipelines.estimation.observers import Reconstruction
 from pipelines.estimation.regression import Rows
 from pipelines.estimation.rests import moving_rows
 from pipelines.estimation.result import Result, course, parameters, validity
@@ -84,7 +83,7 @@ class Settings(Reconstruction):
 
     @property
     def reconstruction(self) -> Reconstruction:
-        return Reconstruction(self.method, self.order, self.jerk_std, self.bandwidth)
+        return Reconstruction(self.method, self.order, self.bandwidth)
 
 
 def read(request: Request, settings: Settings) -> Inputs:

@@ -21,19 +21,12 @@ from pipelines.dynamics.parameter import Origin, Parameter
 from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import Check, NothingMatched, UsageError, did_you_mean
 from pipelines.estimation.estimate import Recipe
-from pipelines.estimation.motion import reconstruct
+from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.estimation.nominal import fitted_arm
-from pipelines.estimation.observers import Reconstruction
 from pipelines.estimation.result import validity
 from pipelines.friction.config import FolderConfig
 from pipelines.friction.findings import findings_of, misfits
-from pipelines.friction.joint import (
-    JointFit,
-    JointLogs,
-    Seen,
-    fit_joint,
-    friction_of,
-)
+from pipelines.friction.joint import JointFit, JointLogs, Seen, fit_joint, friction_of
 from pipelines.friction.laws import LADDER, Law, law_named
 from pipelines.friction.result import Result, joint_result, several_results
 from pipelines.friction.several import fit_several
@@ -59,7 +52,8 @@ class Settings:
     """Law and windows of the fit."""
 
     law: str | None = option(
-        None, "Law to fit, as the report names it. [the simplest that is not worse]")
+        None, "Law to fit, as the report names it. [the simplest that is not worse]"
+    )
     window: float = option(FolderConfig.window, "Windows of the equations [s], the shortest.")
     order: int = Reconstruction.order  # of the smoother that motion begins with
     together: bool = True  # where no joint was driven alone: friction with the base parameters
@@ -86,70 +80,101 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         there = ", ".join(kinds) or "none"
         also = "; fit-friction by itself also takes logs in which all move" if together else ""
         raise NothingMatched(
-            "C06", f"no friction log of role identify; there are: {there}", where=inputs.label,
+            "C06",
+            f"no friction log of role identify; there are: {there}",
+            where=inputs.label,
             remedy="drive each joint alone, the others held, and record it as "
-            f"experiment 'friction'{also}")
+            f"experiment 'friction'{also}",
+        )
     used = [log for log in logs if log.role in ("identify", "validate")]
     seen, checks = _examined(used, Reconstruction(order=settings.order))
     joints = [fit_joint(part, settings.window, law) for part in _by_joint(seen)]
     robot = identify[0].robot
-    results = tuple(joint_result(joint, robot.joints[joint.logs.joint - 1].name)
-                    for joint in joints)
+    results = tuple(
+        joint_result(joint, robot.joints[joint.logs.joint - 1].name) for joint in joints
+    )
     for joint, result in zip(joints, results, strict=True):
         checks += findings_of(joint, result)
     checks += misfits(results, inputs.label)
     arm = _arm(identify[0], joints)
     notes = ["friction fitted by rrrid fit-friction, joint by joint"]
     if arm.body.known_parameters() is None:
-        notes.append("base parameters were not fitted and are not known: zero stands for them; "
-                     "rrrid estimate-bps finds them")
+        notes.append(
+            "base parameters were not fitted and are not known: zero stands for them; "
+            "rrrid estimate-bps finds them"
+        )
     model = _model(arm, [pair for joint in joints for pair in joint.logs.identify], *notes)
-    derived = tuple(_derived(pair, joint, arm, settings) for joint in joints
-                    for pair in (*joint.logs.identify, *joint.logs.validate))
-    return Result(identify[0].robot_name, results, "one joint at a time", tuple(checks),
-                  model=model, derived=derived)
+    derived = tuple(
+        _derived(pair, joint, arm, settings)
+        for joint in joints
+        for pair in (*joint.logs.identify, *joint.logs.validate)
+    )
+    return Result(
+        identify[0].robot_name,
+        results,
+        "one joint at a time",
+        tuple(checks),
+        model=model,
+        derived=derived,
+    )
 
 
-def _together(logs: list[ExperimentLog], settings: Settings, law: Law | None,
-              label: str) -> Result:
+def _together(logs: list[ExperimentLog], settings: Settings, law: Law | None, label: str) -> Result:
     """Fit friction with the base parameters, from logs in which all joints move."""
     how = Reconstruction(order=settings.order)
     if law is not None and (law.sees_load or not law.pointwise):
-        raise UsageError("C02", f"{law.name} cannot be fitted while all joints move",
-                         where="--law", remedy="drive each joint alone, or choose a law of speed "
-                         "and position")
+        raise UsageError(
+            "C02",
+            f"{law.name} cannot be fitted while all joints move",
+            where="--law",
+            remedy="drive each joint alone, or choose a law of speed and position",
+        )
     seen, checks = _examined([log for log in logs if log.role == "identify"], how)
     others, more = _examined([log for log in logs if log.role == "validate"], how)
     found = fit_several(tuple(seen), tuple(others), Recipe(how), law)
     name = seen[0][0].robot_name
     arm = fitted_arm(found.fitted.estimate, name)
     model = _model(arm, seen, "friction and base parameters fitted together by rrrid fit-friction")
-    derived = tuple(_with_friction(pair, arm.friction_torque(pair[1].motion), settings)
-                    for pair in (*seen, *others))
+    derived = tuple(
+        _with_friction(pair, arm.friction_torque(pair[1].motion), settings)
+        for pair in (*seen, *others)
+    )
     results = several_results(found, arm, tuple(others))
-    return Result(name, results, "all joints at once", (*checks, *more, *misfits(results, label)),
-                  model=model, derived=derived)
+    return Result(
+        name,
+        results,
+        "all joints at once",
+        (*checks, *more, *misfits(results, label)),
+        model=model,
+        derived=derived,
+    )
 
 
 def _law(settings: Settings) -> Law | None:
     """Return the law to fit; None: choose one."""
     shortest, longest = WINDOWS
     if not shortest <= settings.window <= longest:
-        raise UsageError("C02", f"windows of {settings.window:g} s", where="--window",
-                         remedy=f"give {shortest:g} to {longest:g} s")
+        raise UsageError(
+            "C02",
+            f"windows of {settings.window:g} s",
+            where="--window",
+            remedy=f"give {shortest:g} to {longest:g} s",
+        )
     if settings.law is None:
         return None
     known = [name for law in LADDER for name in (law.name, *law.members)]
     if unknown := [part for part in settings.law.split("+") if part not in known]:
         near = did_you_mean(unknown[0], known)
-        raise UsageError("C02", f"'{unknown[0]}' is no friction law{near}", where="--law",
-                         remedy=f"one of {', '.join(law.name for law in LADDER)}, or several "
-                         "joined by +")
+        raise UsageError(
+            "C02",
+            f"'{unknown[0]}' is no friction law{near}",
+            where="--law",
+            remedy=f"one of {', '.join(law.name for law in LADDER)}, or several joined by +",
+        )
     return law_named(settings.law)
 
 
-def _examined(logs: Sequence[ExperimentLog],
-              how: Reconstruction) -> tuple[list[Seen], list[Check]]:
+def _examined(logs: Sequence[ExperimentLog], how: Reconstruction) -> tuple[list[Seen], list[Check]]:
     """Return the motion of every log, and the findings of its quality checks."""
     seen, checks = [], list[Check]()
     for log in logs:
@@ -164,8 +189,11 @@ def _by_joint(seen: Sequence[Seen]) -> list[JointLogs]:
     for pair in seen:
         if pair[0].joint is not None:
             parts.setdefault((pair[0].joint, pair[0].role), []).append(pair)
-    return [JointLogs(joint, tuple(own), tuple(parts.get((joint, "validate"), ())))
-            for (joint, role), own in sorted(parts.items()) if role == "identify"]
+    return [
+        JointLogs(joint, tuple(own), tuple(parts.get((joint, "validate"), ())))
+        for (joint, role), own in sorted(parts.items())
+        if role == "identify"
+    ]
 
 
 def _arm(log: ExperimentLog, joints: Sequence[JointFit]) -> Arm:
@@ -174,30 +202,32 @@ def _arm(log: ExperimentLog, joints: Sequence[JointFit]) -> Arm:
     known = body.known_parameters()
     values = np.zeros(len(body.parameters)) if known is None else known
     origin: Origin = "assumed" if known is None else "known"
-    base = tuple(Parameter(p.name, float(value), None, p.unit, origin=origin,
-                           visible=known is not None)
-                 for p, value in zip(body.parameters, values, strict=True))
+    base = tuple(
+        Parameter(p.name, float(value), None, p.unit, origin=origin, visible=known is not None)
+        for p, value in zip(body.parameters, values, strict=True)
+    )
     friction, at_rest = friction_of(joints, log.robot)
     return Arm(log.robot_name, body, base, friction, at_rest)
 
 
 def _model(arm: Arm, motions: Sequence[Seen], *notes: str) -> ModelFile:
     """Return the model of `arm`, which was fitted to `motions`."""
-    sources = tuple(Source(log.name, digest_of(recording(log)), log.experiment, log.role)
-                    for log, _ in motions)
+    sources = tuple(
+        Source(log.name, digest_of(recording(log)), log.experiment, log.role) for log, _ in motions
+    )
     return arm.to_model(validity=validity(tuple(motions)), sources=sources, notes=notes)
 
 
-def _derived(pair: Seen, joint: JointFit, arm: Arm,
-             settings: Settings) -> tuple[str, ExperimentLog]:
+def _derived(
+    pair: Seen, joint: JointFit, arm: Arm, settings: Settings
+) -> tuple[str, ExperimentLog]:
     friction = arm.friction_torque(pair[1].motion)
     only = np.zeros_like(friction)  # of the joint that was driven: at rest eq. (10) has none
     only[:, joint.logs.joint - 1] = friction[:, joint.logs.joint - 1]
     return _with_friction(pair, only, settings)
 
 
-def _with_friction(pair: Seen, friction: Array,
-                   settings: Settings) -> tuple[str, ExperimentLog]:
+def _with_friction(pair: Seen, friction: Array, settings: Settings) -> tuple[str, ExperimentLog]:
     log, motion = pair
     how = Reconstruction(order=settings.order)
     with_motion = derive(log, "reconstruct", how.as_settings(), motion.signals())
@@ -237,8 +267,21 @@ def _restored(result: Result, folder: Path) -> Result:
     return replace(result, model=read_model(folder / "model.json"))
 
 
-STAGE = Stage("fit-friction", "Fit the friction law of each joint", Settings, compute, report,
-              read_logs, write, _exit_code, lambda result: result.checks, _onward,
-              # estimate-bps fits Coulomb and viscous friction itself
-              in_run=Settings(together=False), hands_on="material", uses=Uses(_reads),
-              restored=_restored, sessions="one")
+STAGE = Stage(
+    "fit-friction",
+    "Fit the friction law of each joint",
+    Settings,
+    compute,
+    report,
+    read_logs,
+    write,
+    _exit_code,
+    lambda result: result.checks,
+    _onward,
+    # estimate-bps fits Coulomb and viscous friction itself
+    in_run=Settings(together=False),
+    hands_on="material",
+    uses=Uses(_reads),
+    restored=_restored,
+    sessions="one",
+)

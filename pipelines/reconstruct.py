@@ -116,15 +116,14 @@ def _warnings(log: LogResult, settings: Settings, path: Path) -> list[Check]:
         limit = max(float(log.alarm[j - 1]) for j in far)
         words = f"the reconstructed position of joint {joints} is up to {worst:.2g} rad from "
         words += f"the measured one, more than {limit:.3g} rad"
-        remedy = "allow more jerk or bandwidth, or look for jumps and slips of the encoder"
+        remedy = "allow more bandwidth, or look for jumps and slips of the encoder"
         found.append(Check.of("D12", "warn", words, where=path, gate=True, remedy=remedy))
-    forced = settings.jerk_std is not None or settings.bandwidth is not None
     correlated = log.coloured
-    if forced and correlated and not np.isnan(log.speed_std).all():
+    if settings.bandwidth is not None and correlated:
         joints = ", ".join(map(str, correlated))
         words = f"with these settings the innovations of joint {joints} are strongly "
         words += "coloured; the stated standard deviations hold only where they are white"
-        remedy = "leave --jerk-std and --bandwidth to be found from the data"
+        remedy = "leave --bandwidth to be found from the data"
         found.append(Check.of("C02", "warn", words, where=path, remedy=remedy))
     return found
 

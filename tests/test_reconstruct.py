@@ -77,7 +77,7 @@ def test_a_derived_log_is_a_log(container: str, shared: Path, tmp_path: Path) ->
     for name, values in fresh.signals().items():
         assert np.array_equal(values, derived[name])
         assert np.array_equal(values, taken.signals()[name])
-    assert not motion_of(derived, Settings(order=2)).derived
+    assert not motion_of(derived, Settings(order=3)).derived
     if container == "h5":
         done = subprocess.run([sys.executable, shared / "tools/check_log.py", path], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout
@@ -128,9 +128,9 @@ def test_periods_tell_the_noise(tmp_path: Path) -> None:
 
 
 def test_innovations_are_judged(tmp_path: Path) -> None:
-    """A jerk level far too low is seen: the innovations are coloured, and the words say so; a joint at rest is not judged."""
+    """A bandwidth far too low is seen: the innovations are coloured, and the words say so; a joint at rest is not judged."""
     tuned = stage(tmp_path / "a", good_log()).result.logs[0]
-    stiff = stage(tmp_path / "b", good_log(), settings=Settings(jerk_std=(0.5,))).result.logs[0]
+    stiff = stage(tmp_path / "b", good_log(), settings=Settings(bandwidth=(8.0,))).result.logs[0]
     assert (stiff.innovation_correlation > 3 * tuned.innovation_correlation).all()
     assert all(words.startswith("coloured") for words in stiff.innovation_verdict)
     assert not any(words.startswith("coloured") for words in tuned.innovation_verdict)
@@ -150,13 +150,13 @@ def test_plans_have_no_motion(tmp_path: Path) -> None:
 
 
 def test_command_line(samples: Path, tmp_path: Path) -> None:
-    """--jerk-std as a list, --method, --format and --json; a wrong list is wrong usage."""
+    """--bandwidth as a list, --method, --format and --json; a wrong list is wrong usage."""
     log = str(samples / "rrr-closed-form/friction-1.h5")
-    done = rrrid("reconstruct", log, "--out", "out", "--jerk-std", "50,60", "--jerk-std", "70", "--method", "observer",
+    done = rrrid("reconstruct", log, "--out", "out", "--bandwidth", "50,60", "--bandwidth", "70", "--method", "observer",
                  "--format", "parquet", "--json", "--no-report", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
-    np.testing.assert_allclose(result["observer"]["jerk_std"], [50.0, 60.0, 70.0])
+    np.testing.assert_allclose(result["observer"]["bandwidth_hz"], [50.0, 60.0, 70.0], rtol=1e-6)
     assert (tmp_path / "out/logs/friction-1.parquet").exists()
     for key in ("gains", "bandwidth_hz", "measurement_std", "jerk_std"):
         assert len(result["observer"][key]) == 3

@@ -22,7 +22,6 @@ class GridConfig:
     long: int = 4096  # missing samples: of more, only the first are predicted
     predicted: int = 1024  # samples: those
     bridged: int = 10  # missing samples: after more a new grid begins
-    late: float = 1e-3  # of a sample: nearer than this, a sample lies on its place
     crowded: float = 0.05  # of all samples: more on a place with another is no clock
 
 
@@ -60,8 +59,6 @@ class MeanPeriodConfig:
     still: float = 1e-3  # [rad or m] that matters to no regressor
     alike_torque: float = 0.1  # of the torque
     noise: float = 3.0  # times what sample-to-sample noise explains: less is no difference
-    drift: float = 0.25  # of the scatter that goes one way from the first period to the last
-    sure: float = 5.0  # standard deviations of that share
 
 
 @dataclass(frozen=True)
@@ -71,13 +68,9 @@ class ReconstructionConfig:
     finest: float = 1e-6  # [rad] where no step is described or seen: far below any encoder
     forgotten: float = 7.0  # time constants after which a start is forgotten to about 1/1000
     latest: int = 32768  # samples by which an observer must have forgotten its start
-    nothing: float = 1e4  # tracking index from which nothing is filtered by far
-    fastest: float = 0.49  # of the rate, the highest bandwidth that is named
-    rounding: float = 0.1  # of a bound: what is printed of it is accepted
-    bridge_hz: float = 100.0  # of the observer that bridges missing samples before tuning
+    fastest: float = 0.4  # of the rate, the highest bandwidth
+    settle: float = 4.0  # periods of the bandwidth, after which an observer has forgotten its start
     lead: int = 2  # missing samples at the very start that are predicted from what comes after
-    cutoff_hz: float = 100.0  # of the zero-phase filter where no bandwidth is given
-    highest: float = 0.4  # of the rate, its cut-off
     vague: float = 2.0  # times the usual standard deviation of the acceleration
     beyond: float = 5.0  # usual deviations: no bound below it, however still a joint stands
 

@@ -1,18 +1,30 @@
 """Lay the samples of a log on even grids, as filters need them, and read states off them.
 
-    seen = measured(log)
+    even = evened(log, good)       on an even grid, for a log whose clock is uneven; else None
+    seen = measured(log)           positions on the grids of an even clock
     for grid in seen.grids:
         states, std = on_grid(seen.y[grid.first:grid.last], grid, seen.step, track)
 
-Nothing is interpolated: a place of the grid that holds no sample is missing. A log whose clock is
-uneven is resampled before (`uneven_clock`); what remains here is a clock that runs a little fast,
-and lost samples.
+On a grid nothing is interpolated: a place that holds no sample is missing.
+
+A clock that is uneven ticks at g_k, a sample is taken at t_k = g_k + a_k and stamped s_k = t_k +
+b_k. Of the deviation e_k = s_k - g_k of a stamp from its tick the share
+
+    w = var a / (var a + var b),    E[t_k | s_k] = g_k + w e_k
+
+is a deviation of the sampling, the rest is one of the stamp (linear regression). Positions show w:
+to first order y_k = q(g_k) + w dq(g_k) e_k + noise, and the residual of a local polynomial of y is
+free of the smooth q. So w is the coefficient of a regression of that residual on the residual of
+dq e, all joints together, each weighted by its noise R_j + (dq_j σ_t)², where σ_t is the jitter
+that remains. The ticks are a random walk with a white deviation (local level model, Harvey 1989,
+sec. 2.2): a timer has ticks on a straight line, a loop that sleeps between samples walks. The
+variogram of the stamps, E(x_{k+m} - x_k)² = m σ_walk² + 2 σ_e², tells one from the other.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
@@ -20,16 +32,18 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
-from pipelines.estimation.config import GridConfig
+from pipelines.estimation.config import ClockConfig, GridConfig
+from pipelines.estimation.filters import apply_kernel, half_width, kernel
 from pipelines.io.limits import SHORTEST, recorded_span
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.quality.segments import Usable, usable
 
 Indices = npt.NDArray[np.intp]
 # samples of a grid -> states and deviations (order, samples, joints)
-Tracker = Callable[[Array], tuple[Array, Array | None]]
+Tracker = Callable[[Array], tuple[Array, Array]]
 
-_CONFIG = GridConfig()
+_CONFIG, _CLOCK = GridConfig(), ClockConfig()
+_EVEN = "record with an even clock, or resample with 'rrrid import'"
 
 
 @dataclass(frozen=True)
@@ -40,17 +54,10 @@ class Grid:
     last: int
     step: float  # [s] of this clock
     place: Indices  # (rows,) from 0 upwards
-    late: Array  # (rows,) how long after its place each was taken, in steps
-    alone: npt.NDArray[np.bool_]  # (rows,) the sample that stands for its place
 
     @property
     def size(self) -> int:
         return int(self.place[-1]) + 1
-
-    @property
-    def wanders(self) -> bool:
-        """Return whether a sample was taken away from its place."""
-        return bool((np.abs(self.late) > _CONFIG.late).any())
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,13 +99,9 @@ def measured(log: ExperimentLog, good: Usable | None = None) -> Measured:
         words = f"joint {int(np.argmax(lost.all(axis=0))) + 1} has no measurement at all"
         remedy = "leave the joint out, or record it again"
         raise InputRejected("D02", words, where=where, remedy=remedy)
-    bad = np.diff(lost.any(axis=1).astype(np.int8), prepend=0, append=0)
-    ends = [
-        place
-        for a, b in np.flatnonzero(bad).reshape(-1, 2).tolist()
-        if b - a > _CONFIG.long
-        for place in (a + _CONFIG.predicted, b)
-    ]
+    edges = np.flatnonzero(np.diff(lost.any(axis=1).astype(np.int8), prepend=0, append=0))
+    long = [(a, b) for a, b in edges.reshape(-1, 2).tolist() if b - a > _CONFIG.long]
+    ends = [place for a, b in long for place in (a + _CONFIG.predicted, b)]
     jumps = np.flatnonzero(good.jumped.any(axis=1))
     cuts = np.concatenate([jumps, [good.end], ends]).astype(np.intp)
     step = log.sample_time if good.time.known else good.time.median
@@ -121,43 +124,30 @@ def grids(
     if cuts is not None:
         new[cuts[(cuts > 0) & (cuts < len(t))] - 1] = True
     borders = np.concatenate([[0], np.flatnonzero(new) + 1, [len(t)]])
-    found = [_grid(t, a, b, sample_time) for a, b in pairwise(borders.tolist())]
-    crowded = sum(int(np.count_nonzero(~grid.alone)) for grid in found)
+    found, crowded = [], 0
+    for first, last in pairwise(borders.tolist()):
+        since = t[first:last] - t[first]
+        count = np.diff(since) / sample_time
+        whole, unit = np.rint(count), sample_time
+        if len(count) and np.abs(count - whole).max() < 0.25 and whole.min() >= 1:
+            unit = float(since[-1] / whole.sum())  # the clock's own step: it may run a little fast
+        place = np.rint(since / unit).astype(np.intp)
+        crowded += int(np.count_nonzero(np.diff(place) == 0))
+        found.append(Grid(first, last, unit, place))
     if crowded > _CONFIG.crowded * len(t):
-        words = f"{crowded} of {len(t)} samples lie nearer to another's place"
-        remedy = "record with an even clock, or resample with 'rrrid import'"
-        raise InputRejected("T05", f"the clock is too uneven: {words}", remedy=remedy)
+        words = f"the clock is too uneven: {crowded} of {len(t)} samples lie on another's place"
+        raise InputRejected("T05", words, remedy=_EVEN)
     return found
-
-
-def _grid(t: Array, first: int, last: int, sample_time: float) -> Grid:
-    since = t[first:last] - t[first]
-    count = np.diff(since) / sample_time
-    whole, several = np.rint(count), len(since) > 1
-    unit, wanders = sample_time, several and np.abs(count - whole).max() > _CONFIG.late
-    if several and np.all(np.abs(count - whole) < 0.25) and whole.min() >= 1:
-        unit = float(since[-1] / whole.sum())  # the clock's own step: it may run a little fast
-    exact = since / unit
-    if wanders:  # the places lie where most samples do, not where the first happens to
-        exact -= np.angle(np.exp(2j * np.pi * exact).mean()) / (2.0 * np.pi)
-    place = np.rint(exact).astype(np.intp)
-    place -= place.min()
-    exact += place[0] - np.rint(exact[0])
-    late = exact - place
-    alone = np.ones(len(place), dtype=bool)
-    for k in np.flatnonzero(np.diff(place) <= 0).tolist():
-        alone[k if abs(late[k]) > abs(late[k + 1]) else k + 1] = False
-    return Grid(first, last, unit, place, late, alone)
 
 
 def lay_on(y: Array, grid: Grid) -> Array:
     """Return `y` (rows, joints) of one grid at its places, NaN where nothing was measured."""
     out = np.full((grid.size, *y.shape[1:]), np.nan)
-    out[grid.place[grid.alone]] = y[grid.alone]
+    out[grid.place] = y
     return out
 
 
-def on_grid(y: Array, grid: Grid, sample_time: float, track: Tracker) -> tuple[Array, Array | None]:
+def on_grid(y: Array, grid: Grid, sample_time: float, track: Tracker) -> tuple[Array, Array]:
     """Return states and deviations (order, rows, joints) of `y` (rows, joints).
 
     `track` counts in `sample_time`: a derivative of order i grows by (nominal / own)^i.
@@ -165,9 +155,9 @@ def on_grid(y: Array, grid: Grid, sample_time: float, track: Tracker) -> tuple[A
     states, std = track(lay_on(y, grid))
     ratio = sample_time / grid.step
     if abs(ratio - 1.0) < 1e-9:
-        return states[:, grid.place], None if std is None else std[:, grid.place]
+        return states[:, grid.place], std[:, grid.place]
     scale = (ratio ** np.arange(len(states)))[:, None, None]
-    return states[:, grid.place] * scale, None if std is None else std[:, grid.place] * scale
+    return states[:, grid.place] * scale, std[:, grid.place] * scale
 
 
 def grid(start: float, end: float, rate: float) -> Array:
@@ -195,8 +185,196 @@ def resample(
     return np.asarray(spline(at), dtype=np.float64)
 
 
-def through(at: Array, values: Array, wanted: Array) -> Array:
-    """Return a cubic spline through `values` (samples, channels) at `at`, at the `wanted` times."""
-    from scipy.interpolate import CubicSpline
+@dataclass(frozen=True, eq=False)
+class Evened:
+    """A log on an even grid."""
 
-    return np.asarray(CubicSpline(at, values)(wanted))
+    log: ExperimentLog
+    good: Usable  # of `log`
+    # kept samples of the recording, samples of `log`, instants
+    stretches: tuple[tuple[slice, slice, Array], ...]
+
+    def at_recording(self, values: Array, samples: int, spline: bool) -> Array:
+        """Return signals (k, n, joints) at the kept samples of the recording, NaN outside runs."""
+        out = np.full((len(values), samples, values.shape[2]), np.nan)
+        flat = np.moveaxis(values, 1, 0).reshape(values.shape[1], -1)
+        for recorded, even, t in self.stretches:
+            at = resample(self.log.t[even], flat[even], t, "spline" if spline else "linear")
+            out[:, recorded] = np.moveaxis(at.reshape(-1, *out.shape[::2]), 0, 1)
+        return out
+
+
+def evened(log: ExperimentLog, good: Usable) -> Evened | None:
+    """Return `log` on an even grid of its nominal sample time; None where its clock is even.
+
+    Positions and measured torques are splines through the instants, a held command is its average
+    over each step. Lost samples within a stretch are bridged by the spline; a gap remains a gap,
+    and missing or spoilt samples remain so.
+
+    Raises:
+        InputRejected: T05, samples lie on each other.
+    """
+    if good.time.jitter <= _CLOCK.even or not good.runs:
+        return None
+    step = log.sample_time if good.time.known else good.time.median
+    parts, stretches, done = [], [], 0
+    for run in good.runs:
+        stamps = good.log.t[run]
+        q = np.where(good.position_spikes[run], np.nan, good.log.q[run])
+        t = instants(stamps, _filled(stamps, q), step).t
+        at = grid(float(t.min()), float(t.max()), 1.0 / step)
+        parts.append((at, *_sampled(good, run, q, t, at, step)))
+        stretches.append((run, slice(done, done + len(at)), t))
+        done += len(at)
+    t, q, tau, saturated = (np.concatenate(part) for part in zip(*parts, strict=True))
+    values = {"t": t, "q": q, "tau": tau}
+    signals = {name: replace(good.log.signals[name], values=x) for name, x in values.items()}
+    even = replace(log, signals=signals, sample_time=step, derived=None)
+    return Evened(even, replace(usable(even), saturated=saturated > 0.0), tuple(stretches))
+
+
+def _sampled(
+    good: Usable, run: slice, q: Array, t: Array, at: Array, step: float
+) -> tuple[Array, Array, Array]:
+    """Return position, torque and saturation (n, joints) of one stretch at even times."""
+    tau = np.where(good.torque_spikes[run], np.nan, good.log.tau[run])
+    lost = np.hstack([np.isnan(q), np.isnan(tau), good.saturated[run]]).astype(np.float64)
+    order = np.argsort(t, kind="stable")
+    order = order[np.diff(t[order], prepend=-np.inf) >= _CLOCK.closest * step]
+    if len(order) < (1.0 - _CLOCK.merged) * len(t):
+        words = f"the clock is too uneven: {len(t) - len(order)} of {len(t)} samples lie on "
+        where = good.log.source or good.log.name
+        raise InputRejected("T05", f"{words}another's place", where=where, remedy=_EVEN)
+    instant = t[order]
+    q, tau = (_filled(t, x)[order] for x in (q, tau))
+    if good.log.torque == "measured":
+        tau = resample(instant, tau, at)
+    else:
+        tau = average_held(instant, tau, at, step)
+    q = resample(instant, q, at)
+    no_q, no_tau, saturated = np.split(resample(instant, lost[order], at, "linear"), 3, axis=1)
+    return np.where(no_q > 0.0, np.nan, q), np.where(no_tau > 0.0, np.nan, tau), saturated
+
+
+def _filled(t: Array, x: Array) -> Array:
+    """Return `x` (samples, joints) with straight lines where it is not a number."""
+    out = np.array(x)
+    for column in out.T:
+        ill = ~np.isfinite(column)
+        column[ill] = 0.0 if ill.all() else np.interp(t[ill], t[~ill], column[~ill])
+    return out
+
+
+def average_held(t: Array, u: Array, at: Array, step: float) -> Array:
+    """Return the means (n, k) over [at, at + step] of `u` (samples, k), held from sample on.
+
+    u acts from t_k to t_{k+1}: its integral U is piecewise linear, the mean (U(b) - U(a)) / step.
+    """
+    edge = np.append(t, t[-1] + step)
+    total = np.vstack([np.zeros((1, u.shape[1])), np.cumsum(np.diff(edge)[:, None] * u, axis=0)])
+    moved = [np.interp(at + step, edge, x) - np.interp(at, edge, x) for x in total.T]
+    return np.asarray(np.stack(moved, axis=1) / step)
+
+
+@dataclass(frozen=True, eq=False)
+class Instants:
+    """When samples were taken."""
+
+    t: Array  # [s] (samples,)
+    share: float = 1.0  # w of the deviations that is of the sampling; 1 where the clock has none
+    jitter: float = 0.0  # [s] σ_t that remains between t and the true instants
+
+
+def instants(stamps: Array, q: Array, step: float) -> Instants:
+    """Return when the samples of one unbroken stretch were taken.
+
+    Args:
+        stamps: [s] (samples,), increasing.
+        q: positions [rad or m] (samples, joints), finite.
+        step: [s] nominal sample time.
+    """
+    tick = _ticks(stamps)
+    half = half_width(step, _CLOCK.smooth_hz, _CLOCK.order)
+    near = np.zeros(len(q), dtype=bool)  # a lost sample
+    for k in np.flatnonzero(np.diff(stamps) > 2.5 * step).tolist():
+        near[max(0, k - 2 * half) : k + 2 * half + 1] = True
+    keep = ~near[2 * half : -2 * half]
+    if len(q) < 6 * half + 1 or not keep.any() or np.array_equal(tick, stamps):
+        return Instants(stamps)
+    level = kernel(half, _CLOCK.order, 0)
+    speed = apply_kernel(q, kernel(half, _CLOCK.order, 1)) / step
+    inner = q[half:-half], speed * (stamps - tick)[half:-half, None]
+    rest, moved = ((x[half:-half] - apply_kernel(x, level))[keep] for x in inner)
+    speed = speed[half:-half][keep]
+    noise, jitter, share = np.ones(rest.shape[1]), 0.0, 1.0
+    for _ in range(_CLOCK.passes):
+        weight = 1.0 / (noise + (speed * jitter) ** 2)
+        power = float(np.sum(weight * moved**2))
+        if power <= 0.0:
+            return Instants(stamps)
+        share = float(np.sum(weight * moved * rest)) / power
+        noise, jitter = _noise(rest - share * moved, speed, 1.0 - float(level[half]))
+    share = float(np.clip(share, 0.0, 1.0))
+    return Instants(tick + share * (stamps - tick), share, jitter)
+
+
+def _noise(rest: Array, speed: Array, free: float) -> tuple[Array, float]:
+    """Return the noise R (joints,) [rad²] and the jitter σ_t [s] behind residuals (n, joints).
+
+    E r² = (1 - h) (R_j + dq² σ_t²) with `free` = 1 - h, h the weight of the polynomial at its
+    middle: one straight line over dq² for all joints, each with its own level; slope not negative.
+    """
+    power, square = rest**2 / free, speed**2
+    base, usual = np.maximum(power.mean(axis=0), 1e-300), square.mean(axis=0)
+    centred = (square - usual) / base
+    slope = float(np.sum(centred * power / base)) / max(float(np.sum(centred**2)), 1e-300)
+    slope = float(np.clip(slope, 0.0, np.min(base / np.maximum(usual, 1e-300))))
+    return np.maximum(base - slope * usual, 1e-3 * base), float(np.sqrt(slope))
+
+
+def _ticks(stamps: Array) -> Array:
+    """Return the ticks [s] (samples,) of a clock.
+
+    The smoothed level of a local level model is (I + (σ_e²/σ_walk²) DᵀD)⁻¹ x, D the first
+    difference (Harvey 1989, sec. 4.6); without a walk it is the straight line itself.
+    """
+    count, lag = _numbers(stamps), min(_CLOCK.lag, len(stamps) // 4)
+    if lag < 2:
+        return stamps
+    x = stamps - np.polyval(np.polyfit(count, stamps, 1), count)
+    near, far = (float(np.mean((x[m:] - x[:-m]) ** 2)) for m in (1, lag))
+    chance = near * np.sqrt(2.0 / len(x))  # standard deviation of far - near without a walk
+    walk = (far - near) / (lag - 1) if far - near > _CLOCK.sure * chance else 0.0
+    white = 0.5 * (near - walk)
+    if white <= 0.0:
+        return stamps
+    if walk <= 0.0:
+        return stamps - x
+    from scipy.linalg import solveh_banded
+
+    band = np.full((2, len(x)), -white / walk)
+    band[1] = 1.0 + 2.0 * white / walk
+    band[1, [0, -1]] = 1.0 + white / walk
+    return np.asarray(stamps - (x - solveh_banded(band, x)))
+
+
+def _numbers(stamps: Array) -> Array:
+    """Return the numbers of the samples: one more each, and one for every sample lost.
+
+    A loss puts all later stamps off; a late stamp does so to itself alone. A long interval is a
+    loss of as many samples as the medians of the stamps before and after it lie apart.
+    """
+    typical, around = float(np.median(np.diff(stamps))), _CLOCK.around
+    excess = np.diff(stamps) / typical - 1.0
+    near = np.pad(excess, 1)
+    least = np.minimum(excess, np.minimum(excess + near[:-2], excess + near[2:]))
+    long, lost = np.flatnonzero(excess > 0.5), np.zeros(len(stamps))
+    lost[1:] = np.maximum(0.0, np.rint(least))  # a late stamp is followed by a short interval
+    for _ in range(_CLOCK.passes):  # losses nearby, as the pass before has them, are taken out
+        early = stamps / typical - np.arange(len(stamps)) - np.cumsum(lost)
+        windows = np.lib.stride_tricks.sliding_window_view(
+            np.pad(early, around, mode="edge"), around
+        )
+        before, after = (np.median(windows[long + 1 + k], axis=1) for k in (0, around))
+        lost[long + 1] = np.maximum(0.0, np.rint(after - before + lost[long + 1]))
+    return np.asarray(np.arange(len(stamps)) + np.cumsum(lost))

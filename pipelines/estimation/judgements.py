@@ -161,22 +161,24 @@ def equations_of_logs(found: Estimate) -> list[LogEquations]:
 def excited(subject: Subject) -> Sequence[Check | NotTested]:
     """D09 of an "excitation" log: that every base parameter and friction shows, or what does not.
 
-    The motion is that of the quickest filter, which costs a tenth of a smoother; low-pass, columns,
-    weights and what counts as lost in the noise are those of an estimate.
+    By the equations of `estimate-bps`. What sways within its dry friction hardly moves.
     """
     if subject.log.experiment != "excitation":
         return []
+    steps = np.array([step or 0.0 for step in subject.good.steps])
+    still = subject.travel < np.maximum(_CONFIG.least_travel, _CONFIG.steps * steps)
     try:
-        found = excitation(subject)
+        found = excitation(subject, still)
     except InputRejected as why:
         return subject.cannot_tell("D09", why.message)
-    words = [unresolved(found)]
-    # what sways within its dry friction has columns of friction, and they are made of it
-    steps = np.array([step or 0.0 for step in subject.good.steps])
-    least = np.maximum(_CONFIG.least_travel, _CONFIG.steps * steps)
-    still = np.flatnonzero(subject.travel < least) + 1
-    lost = found.unresolved.parameters
-    held = [str(joint) for joint in still if f"coulomb:{joint}:level" not in lost]
+    held = [str(joint) for joint in np.flatnonzero(still) + 1]
+    never = [
+        name
+        for name in found.unresolved.never_moved
+        if name.partition(":")[2].partition(":")[0] not in held
+    ]
+    lost = replace(found.unresolved, never_moved=tuple(never))
+    words = [lost.told(columns_in_words(one.name for one in found.columns.names))]
     if held:
         joints = f"joints {', '.join(held)} hardly move"
         joints = joints if len(held) > 1 else f"joint {held[0]} hardly moves"
@@ -191,13 +193,21 @@ def excited(subject: Subject) -> Sequence[Check | NotTested]:
     return [subject.say("D09", "warn", words_of, gate=True, remedy=REMEDY)]
 
 
-def excitation(subject: Subject) -> Estimate:
+def excitation(subject: Subject, still: Flags | None = None) -> Estimate:
     """Return what `estimate-bps` fits to this log alone.
+
+    Args:
+        still: (joints,) those that count as held.
 
     Raises:
         InputRejected: T04, T05, a log of which no equations can be made.
     """
-    log, how = recording(subject.log), Reconstruction(method="zero-phase")
-    motions = ((log, reconstruct(log, how, subject.good)),)
+    log, how = recording(subject.log), Reconstruction()
+    found = reconstruct(log, how, subject.good)
+    if still is not None:
+        m = found.motion
+        moving = replace(m, dq=np.where(still, 0.0, m.dq), ddq=np.where(still, 0.0, m.ddq))
+        found = replace(found, motion=moving, even=None)
     columns = nominal_columns(log.robot)
+    motions = ((log, found),)
     return estimate(equations_of(motions, with_cutoff(Recipe(how), motions), columns), columns)

@@ -36,11 +36,17 @@ from pipelines.estimation.motion import (
     encoder_resolution,
     noise_response,
 )
-from pipelines.estimation.periods import Periods, average_periods, mean_of_periods, passed_std
+from pipelines.estimation.periods import (
+    Periods,
+    average_periods,
+    filtered,
+    mean_of_periods,
+    passed_std,
+)
 from pipelines.estimation.regression import LogEquations, cutoff_at
 from pipelines.io.limits import shorter_than_period
-from pipelines.io.log import Array, ExperimentLog, Signal, recording
-from pipelines.quality.segments import Mask, quantum, usable
+from pipelines.io.log import Array, ExperimentLog, recording
+from pipelines.quality.segments import quantum, usable
 
 _CONFIG = MeanPeriodConfig()
 _SEED = 20040509  # numerics
@@ -65,17 +71,6 @@ MeanLog = tuple[ExperimentLog, Reconstructed]
 Scatter = tuple[NoiseFloor, MeanLog | None]  # None: the periods are not alike
 
 
-@dataclass(frozen=True, eq=False)
-class _Folded:
-    """The periods of a log, position and torque side by side (samples of a period, 2 joints)."""
-
-    periods: Periods
-    grid: Grid
-    rows: Mask  # (kept samples,) that are averaged
-    first: int  # place on the grid where the first period begins
-    step: float  # [s] between samples of the mean
-
-
 def mean_period(
     log: ExperimentLog, found: Reconstructed, cutoff_hz: float | None
 ) -> tuple[NoiseFloor | None, MeanLog | None]:
@@ -87,16 +82,29 @@ def mean_period(
     Args:
         cutoff_hz: of the zero-phase low-pass over equations; None: none.
     """
-    stamps, joints = found.good.log.t, log.n_joints
-    if log.period is None or shorter_than_period(stamps, log.sample_time, 2.0 * log.period):
+    if found.even is not None:
+        log, found = found.even
+    period, joints = log.period, log.n_joints
+    if period is None or shorter_than_period(found.good.log.t, log.sample_time, 2.0 * period):
         return None, None
+    torque = [quantum(column) or 0.0 for column in found.good.log.tau.T]
+    least = np.append(encoder_resolution(found.good), torque) / np.sqrt(12.0)
     try:
-        folded = _fold(log, found, cutoff_hz)
+        grid, x = _on_one_grid(log, found)
+        least = np.maximum(least, 1e-12 * np.nanstd(x, axis=0))
+        rate, phases = 1.0 / grid.step, round(period / grid.step)
+        hz = np.arange(phases // 2 + 1) / period
+        passed = np.ones(len(hz))
+        if cutoff_hz is not None:
+            passed = passed_both_ways(hz, cutoff_hz, rate)
+        periods = average_periods(x, rate, period, passed, least)
+        if periods.count > 2 and periods.begins_apart(passed, least):
+            periods = average_periods(x, rate, period, passed, least, (0,))
     except InputRejected as problem:
         none = np.full(joints, np.nan)
         return NoiseFloor(0, (), none, none, cutoff_hz, none, none, problem.message), None
-    periods = folded.periods
-    passed, centred = _passed(log, folded.step, cutoff_hz)
+    # ½ (τ_k + τ_{k-1}) of a command
+    centred = passed if log.torque == "measured" else passed * np.cos(np.pi * hz / rate)
     sample = np.sqrt(periods.noise_variance)
     floor = NoiseFloor(
         periods.count,
@@ -106,128 +114,105 @@ def mean_period(
         cutoff_hz,
         passed_std(periods.rest[..., :joints], passed),
         passed_std(periods.rest[..., joints:], centred),
-        _unlike(periods, passed, _least(found, periods.mean), joints),
+        _unlike(periods, passed, least, joints),
     )
-    return floor, None if floor.unlike else _between_copies(log, found, folded)
+    return floor, None if floor.unlike else _between_copies(log, found, periods, grid)
 
 
 def doubts(floor: NoiseFloor | None, where: object) -> list[Check]:
     """T10: periods that are not averaged, and what is left out of the mean."""
-    found = list[Check]()
-    if floor is not None and floor.unlike:
+    if floor is None or not (floor.unlike or floor.left_out):
+        return []
+    if floor.unlike:
         words = f"its periods are not averaged: {floor.unlike}"
         remedy = "check the attribute period; look for a drift, a touch or a changed load"
-        found.append(Check.of("T10", "warn", words, where=where, remedy=remedy))
-    elif floor is not None and floor.left_out:
-        odd = ", ".join(map(str, floor.left_out))
-        words = f"period {odd} differs from the {floor.periods} others and is left out of their "
-        words += "mean"
-        remedy = "the first one often starts from rest; or somebody touched the arm"
-        level: Level = "ok" if floor.left_out == (1,) else "warn"
-        found.append(Check.of("T10", level, words, where=where, remedy=remedy))
-    return found
+        return [Check.of("T10", "warn", words, where=where, remedy=remedy)]
+    odd = ", ".join(map(str, floor.left_out))
+    words = f"period {odd} differs from the {floor.periods} others and is left out of their mean"
+    remedy = "the first one often starts from rest; or somebody touched the arm"
+    level: Level = "ok" if floor.left_out == (1,) else "warn"
+    return [Check.of("T10", level, words, where=where, remedy=remedy)]
 
 
-def _fold(log: ExperimentLog, found: Reconstructed, cutoff_hz: float | None) -> _Folded:
-    """Return the periods of `log`.
+def _on_one_grid(log: ExperimentLog, found: Reconstructed) -> tuple[Grid, Array]:
+    """Return the grid of a log, and position and torque (places, 2 joints) from the first good
+    sample on, NaN where they are not known.
 
     Raises:
-        InputRejected: it cannot be folded.
+        InputRejected: its clock has no single grid.
     """
-    seen, good, period = measured(log, found.good), found.good, log.period or np.inf
+    seen, good = measured(log, found.good), found.good
     most = _CONFIG.sparse * len(good.log.t)
     grid, *more = grids(good.log.t, seen.step, longest=max(10, int(most)))
-    if more or grid.size > most or grid.wanders:
-        words = "its clock wanders" if grid.wanders else "its clock steps back or stands still"
+    if more or grid.size > most:
+        words = "its clock steps back or stands still"
         raise InputRejected("T05", words, remedy="record with an even clock")
-    rows = np.zeros(len(seen.y), dtype=bool)
-    for run in good.runs:
-        rows[run] = True
     x = np.hstack([seen.y, np.where(good.torque_spikes, np.nan, good.log.tau)])
-    rows &= np.isfinite(x).all(axis=1)
-    first = int(grid.place[np.argmax(rows)])
-    rows &= ~found.vague[good.kept].any(axis=1)
-    x[~rows] = np.nan
-    passed, least = _passed(log, grid.step, cutoff_hz)[0], _least(found, x)
-    laid, rate = lay_on(x, grid)[first:], 1.0 / grid.step
-    periods = average_periods(laid, rate, period, passed, least)
-    if periods.count > 2 and periods.begins_apart(passed, least):
-        periods = average_periods(laid, rate, period, passed, least, (0,))
-    return _Folded(periods, grid, rows, first, period / len(periods.mean))
+    x = lay_on(np.where(_known(found)[:, None], x, np.nan), grid)
+    return grid, x[_first(found, grid) :]
 
 
-def _passed(log: ExperimentLog, step: float, cutoff_hz: float | None) -> tuple[Array, Array]:
-    """Return what the low-pass leaves of each harmonic of positions, and of centred torques."""
-    period = log.period or 0.0
-    hz = np.arange(round(period / step) // 2 + 1) / period
-    passed = np.ones(len(hz))
-    if cutoff_hz is not None:
-        passed = passed_both_ways(hz, cutoff_hz, 1.0 / step)
-    # ½ (τ_k + τ_{k-1}) of a command
-    return passed, passed if log.torque == "measured" else passed * np.cos(np.pi * hz * step)
+def _known(found: Reconstructed) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Return the kept samples (samples,) that are averaged."""
+    good, inside = found.good, np.zeros(len(found.good.kept), dtype=bool)
+    for run in good.runs:
+        inside[run] = True
+    bad = good.position_spikes | good.torque_spikes | ~np.isfinite(good.log.q + good.log.tau)
+    return np.asarray(inside & ~(bad | found.vague[good.kept]).any(axis=1))
 
 
-def _least(found: Reconstructed, x: Array) -> Array:
-    """Return (2 joints,) what counting in steps leaves of one sample."""
-    torque = [quantum(column) or 0.0 for column in found.good.log.tau.T]
-    steps = np.append(encoder_resolution(found.good), torque)
-    return np.asarray(np.maximum(steps / np.sqrt(12.0), 1e-12 * np.nanstd(x, axis=0)))
+def _first(found: Reconstructed, grid: Grid) -> int:
+    """Return the place where the first period begins: the first good sample of a stretch."""
+    return int(grid.place[found.good.runs[0].start])
 
 
 def _unlike(periods: Periods, passed: Array, least: Array, joints: int) -> str:
     """Return which joint's periods differ by more than noise, and how; empty where none do."""
     if periods.begins_apart(passed, least):
         return f"the first of its {periods.count} periods begins unlike the others, as from rest"
-    alike = periods.repeats(passed)
-    level = np.hypot(alike.signal, periods.mean.mean(axis=0))
-    size = np.append(alike.signal[:joints], level[joints:])
+    varies = filtered((periods.mean - periods.mean.mean(axis=0))[None], passed)[0]
+    size = np.sqrt((varies**2).mean(axis=0))
+    size[joints:] = np.hypot(size, periods.mean.mean(axis=0))[joints:]
     share = np.repeat([_CONFIG.alike_motion, _CONFIG.alike_torque], joints)
     floor = np.append(np.full(joints, _CONFIG.still), least[joints:])
-    allowed = np.max([_CONFIG.noise * alike.white, share * size, floor], axis=0)
-    worst = int(np.argmax(alike.scatter / np.maximum(allowed, 1e-300)))
-    names = [f"the {what} of joint {j + 1}" for what in ("motion", "torque") for j in range(joints)]
-    if alike.scatter[worst] > allowed[worst]:
-        percent = 100 * alike.scatter[worst] / max(size[worst], 1e-300)
-        return f"{names[worst]} differs from one period to the next by {percent:.2g} % of itself"
-    drift = np.where(alike.scatter > least, 1.0 - alike.order, 0.0)
-    beyond = drift - np.maximum(_CONFIG.drift, _CONFIG.sure * alike.order_std)
-    worst = int(np.argmax(beyond))
-    return f"{names[worst]} drifts over the periods" if beyond[worst] > 0.0 else ""
+    allowed = np.max([_CONFIG.noise * periods.white_std(passed), share * size, floor], axis=0)
+    scatter = passed_std(periods.rest, passed)
+    worst = int(np.argmax(scatter / np.maximum(allowed, 1e-300)))
+    if scatter[worst] <= allowed[worst]:
+        return ""
+    name = f"the {'motion' if worst < joints else 'torque'} of joint {worst % joints + 1}"
+    percent = 100 * scatter[worst] / max(size[worst], 1e-300)
+    return f"{name} differs from one period to the next by {percent:.2g} % of itself"
 
 
-def _between_copies(log: ExperimentLog, found: Reconstructed, folded: _Folded) -> MeanLog:
+def _between_copies(
+    log: ExperimentLog, found: Reconstructed, periods: Periods, grid: Grid
+) -> MeanLog:
     """Return the mean period with copies of itself before and behind, and its motion."""
-    periods, joints, period = folded.periods, log.n_joints, log.period or np.inf
-    phases, kept = len(periods.mean), found.good.kept
-    copies = max(1, int(np.ceil(_CONFIG.margin / period)))
-    start = float(found.good.log.t[0]) + folded.first * folded.grid.step
+    joints, period = log.n_joints, log.period or np.inf
+    phases, good, rows, first = len(periods.mean), found.good, _known(found), _first(found, grid)
+    step, copies = period / phases, max(1, int(np.ceil(_CONFIG.margin / period)))
     place = np.arange((2 * copies + 1) * phases)
-    t: Array = np.asarray(start + (place - copies * phases) * folded.step, dtype=np.float64)
+    start = float(good.log.t[0]) + first * grid.step
+    t = np.asarray(start + (place - copies * phases) * step, dtype=np.float64)
 
     def fold(x: Array) -> Array:
-        laid = lay_on(np.where(folded.rows[:, None], x, np.nan), folded.grid)[folded.first :]
-        mean = mean_of_periods(laid, 1.0 / folded.grid.step, period, periods.used)
-        return mean[place % phases]
+        laid = lay_on(np.where(rows[:, None], x, np.nan), grid)[first:]
+        return mean_of_periods(laid, 1.0 / grid.step, period, periods.used)[place % phases]
 
     average = periods.mean[place % phases]
     values = {"t": t, "q": average[:, :joints], "tau": average[:, joints:]}
-    signals = {
-        name: Signal(values[name], log.signals[name].units, log.signals[name].long_name)
-        for name in values
-    }
-    mean = replace(log, signals=signals, sample_time=folded.step, derived=None)
-    good = replace(usable(mean), saturated=fold(found.good.saturated.astype(np.float64)) > 0.0)
+    signals = {name: replace(log.signals[name], values=x) for name, x in values.items()}
+    mean = replace(log, signals=signals, sample_time=step, derived=None)
+    of_mean = replace(usable(mean), saturated=fold(good.saturated.astype(np.float64)) > 0.0)
+    states = (found.motion.q, found.motion.dq, found.motion.ddq)
+    motion = Motion(t, *(fold(x[good.kept]) for x in states))
     varies = periods.noise_variance[:joints]
-    differing = varies / np.maximum(varies, encoder_resolution(found.good) ** 2 / 12.0)
-    how = Mean(copies * phases, (copies + 1) * phases, periods.count, recording(log), found)
-    motion = Motion(
-        t, *(fold(x[kept]) for x in (found.motion.q, found.motion.dq, found.motion.ddq))
-    )
-    if found.std is None:
-        return mean, Reconstructed(motion, None, None, good, False, how)
+    differing = varies / np.maximum(varies, encoder_resolution(good) ** 2 / 12.0)
     shrink = np.sqrt(1.0 - differing * (1.0 - 1.0 / periods.count))
     q, dq, ddq = (np.median(std, axis=0) * shrink + np.zeros_like(motion.q) for std in found.std)
-    return mean, Reconstructed(motion, (q, dq, ddq), found.observers, good, False, how)
+    how = Mean(copies * phases, (copies + 1) * phases, periods.count, recording(log), found)
+    return mean, Reconstructed(motion, (q, dq, ddq), found.observers, of_mean, False, how)
 
 
 def averaged(

@@ -15,36 +15,77 @@ range of the joint, its largest speed or acceleration.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from pipelines.dynamics.body import Motion
-from pipelines.errors import UsageError
+from pipelines.errors import InputRejected, UsageError
 from pipelines.estimation.config import ReconstructionConfig
-from pipelines.estimation.filters import design_low_pass, zero_phase
-from pipelines.estimation.grids import Measured, Tracker, measured, on_grid
-from pipelines.estimation.observers import (
-    METHODS,
-    Observers,
-    Reconstruction,
-    encoder_resolution,
-    tuned_observers,
-)
-from pipelines.estimation.smoother import smooth, twicing_growth
-from pipelines.estimation.state_estimation import Observer, Start, Track, observe
-from pipelines.estimation.uneven_clock import Evened, evened
+from pipelines.estimation.grids import Measured, evened, lay_on, measured, on_grid
+from pipelines.estimation.state_estimation import Observer, Track, design, observe, smooth
+from pipelines.estimation.tuning import Tuned, sigma_for_bandwidth, tune
 from pipelines.io.log import Array, ExperimentLog, derived_by
+from pipelines.io.option import option
 from pipelines.quality.segments import Mask, Usable, long_blocks, usable
 
-__all__ = ["METHODS", "Mean", "Reconstructed", "Reconstruction", "encoder_resolution"]
-__all__ += ["for_equations", "noise_response", "reconstruct"]
-
-Motions = tuple[tuple[ExperimentLog, "Reconstructed"], ...]
-_Filter = Callable[[Array, Observer, Start | None], Track]
-
+METHODS = ("smoother", "observer")
 _CONFIG = ReconstructionConfig()
 _SIGNALS = ("q_hat", "dq_hat", "ddq_hat")
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """How motion is reconstructed. What is None is found from the data, joint by joint.
+
+    The paper's chain has order 3: a jerk held over each sample. Of a smooth motion its acceleration
+    comes out too large by (ωT)²/12, which over 100 simulated experiments biases a parameter by 0.5
+    standard deviations at worst; a held snap, order 4, errs by the fourth power of ωT.
+    """
+
+    method: str = option("smoother", "smoother or observer.")
+    # of the chain of integrators
+    order: int = option(4, "Integrators in the observer: 3 (Kostić et al. 2004) or 4.")
+    # -3 dB of the observer's position
+    bandwidth: tuple[float, ...] | None = option(
+        None, "Bandwidth [Hz]: one, or one a joint. [from the data]"
+    )
+
+    def as_settings(self) -> dict[str, object]:
+        """Return what a derived log must have been made with to be used."""
+        return asdict(self)
+
+    def check(self, joints: int) -> None:
+        """C02: a method, an order, or a bandwidth for another number of joints."""
+        if self.method not in METHODS:
+            remedy = f"one of {', '.join(METHODS)}"
+            raise UsageError("C02", f"'{self.method}' is no method", "--method", remedy)
+        if self.order not in (3, 4):
+            words = f"an observer of order {self.order}"
+            raise UsageError("C02", words, "--order", "choose order 3 or 4")
+        if self.bandwidth is not None and len(self.bandwidth) not in (1, joints):
+            words = f"{len(self.bandwidth)} values for {joints} joints"
+            raise UsageError("C02", words, "--bandwidth", "give one, or one a joint")
+
+
+@dataclass(frozen=True, eq=False)
+class Observers:
+    """The observer of eq. (20), and the one whose jerk is best for a filter that sees both sides.
+
+    They are the same where a bandwidth was given. Where the smoother looks ahead as well, at an end
+    or over a long gap, the observer's jerk is right. Cross-validation weighs bias against noise in
+    the position; an estimate made of many samples feels the bias far more. So the smoother goes
+    over its own residual once more (`twicing_growth`): over 200 simulated experiments the worst
+    bias of a parameter falls from 0.17 to 0.03 standard deviations.
+    """
+
+    causal: Observer
+    smoothing: Observer
+
+    @property
+    def twice(self) -> bool:
+        """Return whether the smoother goes over its residual: where its jerk is found."""
+        return self.smoothing is not self.causal
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +93,8 @@ class Reconstructed:
     """Motion with its uncertainty, and the observer it came from."""
 
     motion: Motion  # at every sample of the recording
-    # of q, dq, ddq, each (samples, joints); None where the method has none
-    std: tuple[Array, Array, Array] | None
-    observers: Observers | None  # as tuned on the longest stretch; None where there are none
+    std: tuple[Array, Array, Array]  # of q, dq, ddq, each (samples, joints)
+    observers: Observers | None  # as tuned on the longest stretch; None of a derived log
     good: Usable  # which samples, stretches and masks
     derived: bool  # taken from the log instead of computed
     mean: Mean | None = None  # where the log is the mean period of another
@@ -63,16 +103,17 @@ class Reconstructed:
     @property
     def vague(self) -> Mask:
         """(samples, joints) where the acceleration is known half as well as elsewhere, or worse."""
-        if self.std is None:
-            return np.zeros(self.motion.q.shape, dtype=bool)
         return np.asarray(self.std[2] > _CONFIG.vague * known_median(self.std[2]))
 
     def signals(self) -> dict[str, Array]:
         """Return the signals of a derived log."""
         parts = (self.motion.q, self.motion.dq, self.motion.ddq)
         values = dict(zip(_SIGNALS, parts, strict=True))
-        deviations = zip(_SIGNALS, self.std or (), strict=False)
-        return values | {f"{name}_std": std for name, std in deviations}
+        names = [f"{name}_std" for name in _SIGNALS]
+        return values | dict(zip(names, self.std, strict=True))
+
+
+Motions = tuple[tuple[ExperimentLog, Reconstructed], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +131,13 @@ def known_median(x: Array) -> Array:
     """Return the median of each column that is known; NaN where nothing is."""
     known = [column[~np.isnan(column)] for column in x.T]
     return np.array([np.median(column) if column.size else np.nan for column in known])
+
+
+def encoder_resolution(good: Usable) -> Array:
+    """Δθ of each joint [rad] (joints,): described, or seen in the samples, the coarser one."""
+    described = [joint.encoder_resolution or 0.0 for joint in good.log.robot.joints]
+    pairs = zip(good.steps, described, strict=True)
+    return np.array([max(seen or 0.0, known) or _CONFIG.finest for seen, known in pairs])
 
 
 def reconstruct(
@@ -111,26 +159,30 @@ def reconstruct(
     how.check(log.n_joints)
     good = usable(log) if good is None else good
     if (even := evened(log, good)) is not None:
-        return _of_even(log, even, how, good, observers)
-    if derived_by(log, "reconstruct", how.as_settings()) and all(name in log for name in _SIGNALS):
-        motion, known = Motion(log.t, log["q_hat"], log["dq_hat"], log["ddq_hat"]), None
-        if "q_hat_std" in log:
-            known = (log["q_hat_std"], log["dq_hat_std"], log["ddq_hat_std"])
-        return Reconstructed(motion, known, None, good, True)
+        found = reconstruct(even.log, how, even.good, observers)
+        m, samples = found.motion, len(good.kept)
+        states = even.at_recording(np.stack([m.q, m.dq, m.ddq]), samples, spline=True)
+        std = even.at_recording(np.stack(found.std), samples, spline=False)
+        bound = np.stack([np.ptp(m.q, axis=0), *(np.abs(x).max(axis=0) for x in (m.dq, m.ddq))])
+        motion, known = _completed(log, good, states, std, np.maximum(bound, 1e-12))
+        return Reconstructed(motion, known, found.observers, good, False, even=(even.log, found))
+    names = (*_SIGNALS, *(f"{name}_std" for name in _SIGNALS))
+    if derived_by(log, "reconstruct", how.as_settings()) and all(name in log for name in names):
+        q, dq, ddq, q_std, dq_std, ddq_std = (log[name] for name in names)
+        motion = Motion(log.t, q, dq, ddq)
+        return Reconstructed(motion, (q_std, dq_std, ddq_std), None, good, True)
     seen = measured(log, good)
-    states, std = np.full((3, *seen.y.shape), np.nan), np.full((3, *seen.y.shape), np.nan)
-    filtering = how.method in ("smoother", "observer")
-    tuned = (observers or tuned_observers(seen, how)) if filtering else None
-    track = difference_tracker(seen, how) if tuned is None else filter_tracker(tuned, how)
+    tuned = observers or tuned_observers(seen, how)
+    states, std = np.full((2, 3, *seen.y.shape), np.nan)
     for grid in seen.grids:
         rows = slice(grid.first, grid.last)
         if grid.size > 1 and np.isfinite(seen.y[rows]).any():
-            found, deviation = on_grid(seen.y[rows], grid, seen.step, track)
-            states[:, rows] = found[:3]
-            if deviation is not None:
-                std[:, rows] = deviation[:3]
-    bound = _largest(seen, states, std, tuned)
-    return _completed(log, seen.good, states, std if filtering else None, bound, tuned)
+            found_states, deviation = on_grid(
+                seen.y[rows], grid, seen.step, lambda y: track(y, tuned, how)
+            )
+            states[:, rows], std[:, rows] = found_states[:3], deviation[:3]
+    motion, known = _completed(log, good, states, std, _largest(seen, states, std, tuned.causal))
+    return Reconstructed(motion, known, tuned, good, False)
 
 
 def for_equations(motions: Motions) -> Motions:
@@ -138,66 +190,126 @@ def for_equations(motions: Motions) -> Motions:
     return tuple((log, found) if found.even is None else found.even for log, found in motions)
 
 
-def _of_even(
-    log: ExperimentLog, even: Evened, how: Reconstruction, good: Usable, observers: Observers | None
-) -> Reconstructed:
-    """Return the motion at the instants of the samples, from that on an even grid."""
-    found = reconstruct(even.log, how, even.good, observers)
-    motion, samples = found.motion, len(good.kept)
-    states = np.stack([motion.q, motion.dq, motion.ddq])
-    states = even.at_recording(states, samples, spline=True)
-    std = None
-    if found.std is not None:
-        std = even.at_recording(np.stack(found.std), samples, spline=False)
-    sizes = [np.ptp(motion.q, axis=0), *(np.abs(x).max(axis=0) for x in (motion.dq, motion.ddq))]
-    bound = np.maximum(sizes, 1e-12)
-    return _completed(log, good, states, std, bound, found.observers, (even.log, found))
-
-
 def _completed(
-    log: ExperimentLog,
-    good: Usable,
-    states: Array,
-    std: Array | None,
-    bound: Array,
-    observers: Observers | None,
-    even: tuple[ExperimentLog, Reconstructed] | None = None,
-) -> Reconstructed:
-    """Return the motion at all samples of the recording.
+    log: ExperimentLog, good: Usable, states: Array, std: Array, bound: Array
+) -> tuple[Motion, tuple[Array, Array, Array]]:
+    """Return the motion at all samples of the recording, and its deviations.
 
     Nothing is less certain than `bound` (3, joints), and nothing is undefined.
     """
-    known = np.full_like(states, np.nan) if std is None else std
     with np.errstate(invalid="ignore"):
-        unknown = ~np.isfinite(states) | (known >= bound[:, None])
+        unknown = ~np.isfinite(states) | (std >= bound[:, None])
     index = np.arange(states.shape[1])
     for i, j in np.argwhere(unknown.any(axis=1)).tolist():
         gap, x = unknown[i, :, j], states[i, :, j]
         x[gap] = 0.0 if gap.all() else np.interp(index[gap], index[~gap], x[~gap])
-        known[i, gap, j] = bound[i, j]
+        std[i, gap, j] = bound[i, j]
     if len(good.kept) < log.n_samples:  # a sample left out is the one before it
         place = np.searchsorted(good.kept, np.arange(log.n_samples), side="right") - 1
-        states, known = states[:, np.maximum(place, 0)], known[:, np.maximum(place, 0)]
-    known[:, good.time.undefined] = bound[:, None]
-    deviations = None if std is None else (known[0], known[1], known[2])
-    return Reconstructed(Motion(log.t, *states), deviations, observers, good, False, even=even)
+        states, std = states[:, np.maximum(place, 0)], std[:, np.maximum(place, 0)]
+    std[:, good.time.undefined] = bound[:, None]
+    return Motion(log.t, *states), (std[0], std[1], std[2])
 
 
-def _largest(seen: Measured, states: Array, std: Array, tuned: Observers | None) -> Array:
+def _largest(seen: Measured, states: Array, std: Array, causal: Observer) -> Array:
     """Return (3, joints) the range, largest speed and largest acceleration of each joint."""
     inside = np.zeros(len(seen.y), dtype=bool)
     for run in seen.good.runs:
         inside[run] = True
-    usual = np.zeros(states[:, 0].shape)
-    if tuned is not None:
-        causal = tuned.causal
-        usual[: min(3, causal.order)] = causal.std.T[:3]
-        usual[2] = causal.jerk_std if causal.order == 2 else usual[2]
+    usual = causal.std.T[:3]
     with np.errstate(invalid="ignore"):
-        sure = inside[:, None] & ~(std > 10.0 * np.maximum(usual, 1e-300)[:, None])
+        sure = inside[:, None] & ~(std > 10.0 * usual[:, None])
     size = np.where(sure & np.isfinite(states), np.abs(states), 0.0).max(axis=1)
     size[0] = np.nanmax(seen.y, axis=0) - np.nanmin(seen.y, axis=0)
     return np.asarray(np.maximum(np.maximum(size, _CONFIG.beyond * usual), 1e-12))
+
+
+def tuned_observers(seen: Measured, how: Reconstruction) -> Observers:
+    """Return the observers of a log, tuned on the longest stretch of its clock.
+
+    Raises:
+        UsageError: C02, a bandwidth that settles later than the log ends, or filters nothing.
+    """
+    grid, step, resolution = seen.longest, seen.step, encoder_resolution(seen.good)
+    laid = lay_on(seen.y[grid.first : grid.last], grid)
+    try:
+        causal, smoothing = tune(laid, step, resolution, how.order)
+    except InputRejected:  # no stretch without a missing sample is long enough
+        at = np.arange(len(laid))
+        for column in laid.T:
+            lost = np.isnan(column)
+            column[lost] = 0.0 if lost.all() else np.interp(at[lost], at[~lost], column[~lost])
+        causal, smoothing = tune(laid, step, resolution, how.order)
+    if how.bandwidth is not None:
+        low, high = _CONFIG.settle / (min(len(laid), _CONFIG.latest) * step), 1.0 / step
+        low, high = float(f"{low:.3g}"), float(f"{_CONFIG.fastest * high:.3g}")
+        if not all(low <= hz <= high for hz in how.bandwidth):
+            words = "a bandwidth that filters nothing, or settles later than the log ends"
+            remedy = f"choose between {low} and {high} Hz, or leave it to be found from the data"
+            raise UsageError("C02", words, "--bandwidth", remedy)
+        variance = causal.noise_variance
+        hertz = np.broadcast_to(np.array(how.bandwidth), variance.shape)
+        causal = Tuned(sigma_for_bandwidth(hertz, step, variance, how.order), variance)
+    observer = design(step, causal.jerk_std, causal.noise_variance, how.order)
+    if how.method == "observer" or how.bandwidth is not None:
+        return Observers(observer, observer)
+    # noise with a pattern passes for motion in cross-validation: never more jerk than causal
+    sigma = np.minimum(smoothing.jerk_std, causal.jerk_std)
+    return Observers(observer, design(step, sigma, smoothing.noise_variance, how.order))
+
+
+def twicing_growth(order: int) -> Array:
+    """Return by what the deviation of each state (order,) grows where a smoother is run twice.
+
+    Twicing (Tukey 1977, Exploratory Data Analysis, p. 526) passes 1 - (1 - G)² where one pass gives
+    G: the missing part of a motion is squared, and so is the bias. A prior of the chain and noise R
+    leave, at frequency w and relative to R, G + G² - G³ instead of G. With G = 1 / (1 + x^2n) and
+    the derivative i weighing x^2i these are Beta functions: the variance grows by
+    1 + a (1 - a) / 2 with a = (2 i + 1) / 2 n.
+    """
+    a = (2.0 * np.arange(order) + 1.0) / (2.0 * order)
+    return np.asarray(np.sqrt(1.0 + 0.5 * a * (1.0 - a)))
+
+
+def track(y: Array, tuned: Observers, how: Reconstruction) -> tuple[Array, Array]:
+    """Return states and deviations (order, samples, joints) of `y` on one grid.
+
+    The smoother runs once more over its residual; near ends and gaps it is the observer's.
+    """
+    if how.method == "observer":
+        return _filtered(y, tuned.causal, observe)
+    inner = tuned.smoothing
+    states, std = _filtered(y, inner, smooth)
+    if not tuned.twice:
+        return states, std
+    states = states + _filtered(y - states[0], inner, smooth)[0]
+    std = std * twicing_growth(inner.order)[:, None, None]
+    ends, ends_std = _filtered(y, tuned.causal, smooth)
+    # samples after which an end is forgotten to about 1/1000
+    forgotten = _CONFIG.forgotten / -np.log(np.abs(inner.filter.poles).max(axis=1))
+    for j, far in enumerate(np.ceil(forgotten).astype(int).tolist()):
+        lost, near = np.isnan(y[:, j]), np.zeros(len(y), dtype=bool)
+        for a, b in [(0, 0), (len(lost), len(lost)), *long_blocks(lost)]:
+            near[max(0, a - far) : b + far] = True
+        states[:, near, j], std[:, near, j] = ends[:, near, j], ends_std[:, near, j]
+    return states, std
+
+
+def _filtered(
+    y: Array, observer: Observer, run: Callable[[Array, Observer], Track]
+) -> tuple[Array, Array]:
+    """Run a filter over the joints and samples that it can know; NaN elsewhere."""
+    states, std = np.full((2, observer.order, *y.shape), np.nan)
+    present = np.isfinite(y)
+    lead = present.argmax(axis=0)
+    lead[lead <= _CONFIG.lead] = 0  # predicted from what comes after
+    lead[present.sum(axis=0) <= observer.order] = len(y)  # fewer samples than states
+    for first in np.unique(lead[lead < len(y)]).tolist():
+        joints = np.flatnonzero(lead == first)
+        own = observer if len(joints) == y.shape[1] else observer.pick(joints)
+        found = run(y[first:, joints], own)
+        states[:, first:, joints], std[:, first:, joints] = found.states, found.std
+    return states, std
 
 
 def noise_response(
@@ -210,106 +322,9 @@ def noise_response(
     """Return the response (3, samples, joints) of a reconstruction to white noise as strong as that
     of the positions, and its variance [rad²] (joints,).
 
-    Every way to reconstruct is linear in the positions: the response adds to the motion.
+    The reconstruction is linear in the positions: the response adds to the motion.
     """
-    seen = measured(log, found.good)
-    track: Tracker
-    if found.std is None:
-        track, variance = difference_tracker(seen, how), encoder_resolution(found.good) ** 2 / 12.0
-    else:
-        tuned = found.observers or tuned_observers(seen, how)
-        track, variance = filter_tracker(tuned, how), tuned.smoothing.noise_variance
+    tuned = found.observers or tuned_observers(measured(log, found.good), how)
+    variance = tuned.smoothing.noise_variance
     noise = np.sqrt(variance) * rng.standard_normal((samples, log.n_joints))
-    return np.nan_to_num(track(noise)[0][:3]), variance
-
-
-def filter_tracker(tuned: Observers, how: Reconstruction) -> Callable[[Array], tuple[Array, Array]]:
-    """Return the observer or the smoother of one grid, with deviations."""
-    if how.method == "observer":
-        return lambda y: _filtered(y, tuned.causal, observe)
-    if not tuned.twice:
-        return lambda y: _filtered(y, tuned.smoothing, smooth)
-    inner = tuned.smoothing
-    # samples after which an end is forgotten to about 1/1000
-    forgotten = _CONFIG.forgotten / -np.log(np.abs(inner.filter.poles).max(axis=1))
-    reach = np.ceil(forgotten).astype(int).tolist()
-    growth = np.ones(max(3, inner.order))
-    growth[: inner.order] = twicing_growth(inner.order)
-
-    def track(y: Array) -> tuple[Array, Array]:
-        """Smooth, and smooth once more what that left; near ends and gaps as the observer."""
-        states, std = _filtered(y, inner, smooth)
-        states = states + _filtered(y - states[0], inner, smooth)[0]
-        std = std * growth[:, None, None]
-        ends, ends_std = _filtered(y, tuned.causal, smooth)
-        for j, far in enumerate(reach):
-            lost, near = np.isnan(y[:, j]), np.zeros(len(y), dtype=bool)
-            for a, b in [(0, 0), (len(lost), len(lost)), *long_blocks(lost)]:
-                near[max(0, a - far) : b + far] = True
-            states[:, near, j], std[:, near, j] = ends[:, near, j], ends_std[:, near, j]
-        return states, std
-
-    return track
-
-
-def _filtered(y: Array, observer: Observer, run: _Filter) -> tuple[Array, Array]:
-    """Run a filter over the joints and samples that it can know; NaN elsewhere.
-
-    Returns states and deviations (3 or more, samples, joints): an acceleration for any order.
-    """
-    order = observer.order
-    states, std = (np.full((max(3, order), *y.shape), np.nan) for _ in range(2))
-    present = np.isfinite(y)
-    lead = present.argmax(axis=0)
-    lead[lead <= _CONFIG.lead] = 0  # predicted from what comes after
-    lead[present.sum(axis=0) <= order] = len(y)  # fewer samples than states
-    for first in np.unique(lead[lead < len(y)]).tolist():
-        joints = np.flatnonzero(lead == first)
-        whole = len(joints) == y.shape[1]
-        where = slice(None) if whole else joints
-        own = observer if whole else observer.pick(joints)
-        track = run(y[first:, where], own, None)
-        states[:order, first:, where] = track.states
-        std[:order, first:, where] = track.full_std()
-    if order == 2:  # the held acceleration itself, known as well as it is bounded
-        states[2] = np.gradient(states[1], observer.sample_time, axis=0)
-        std[2] = np.where(np.isfinite(std[1]), observer.jerk_std, np.nan)
-    return states, std
-
-
-def difference_tracker(seen: Measured, how: Reconstruction) -> Tracker:
-    """Return central differences, of the samples or of what a zero-phase low-pass leaves of them.
-
-    Raises:
-        UsageError: C02, a cut-off that no such log can be filtered with.
-    """
-    lowest, highest = 1.0 / (seen.longest.size * seen.step), _CONFIG.highest / seen.step
-    smooth_first = how.method == "zero-phase"
-    if smooth_first and not all(lowest <= hz <= highest for hz in how.bandwidth or ()):
-        words = "a cut-off whose period is longer than the log, or near half the rate"
-        remedy = f"choose between {lowest:.2g} and {highest:.3g} Hz"
-        raise UsageError("C02", words, "--bandwidth", remedy)
-
-    def central(y: Array) -> tuple[Array, Array | None]:
-        if smooth_first:
-            cutoff = _CONFIG.cutoff_hz if how.bandwidth is None else max(how.bandwidth)
-            low_pass = design_low_pass(min(cutoff, highest), 1.0 / seen.step)
-            y = y if np.isfinite(y).all() else _predicted(seen, y)
-            y = zero_phase(y, low_pass) if len(y) > low_pass.padding else y
-        dq, ddq = np.full_like(y, np.nan), np.full_like(y, np.nan)
-        dq[1:-1] = (y[2:] - y[:-2]) / (2.0 * seen.step)
-        ddq[1:-1] = (y[2:] - 2.0 * y[1:-1] + y[:-2]) / seen.step**2
-        return np.stack([y, dq, ddq]), None
-
-    return central
-
-
-def _predicted(seen: Measured, y: Array) -> Array:
-    """Return `y` with missing samples as the smoother predicts them."""
-    how = Reconstruction()
-    states, _ = filter_tracker(tuned_observers(seen, how), how)(y)
-    whole, at = np.where(np.isfinite(y), y, states[0]), np.arange(len(y))
-    for column in whole.T:  # before the first sample, or a joint without any
-        known = np.isfinite(column)
-        column[~known] = np.interp(at[~known], at[known], column[known]) if known.any() else 0.0
-    return whole
+    return np.nan_to_num(track(noise, tuned, how)[0][:3]), variance

@@ -10,11 +10,15 @@ from pipelines.estimation.config import ResultConfig
 from pipelines.estimation.filters import welch
 from pipelines.estimation.grids import Measured, lay_on, measured
 from pipelines.estimation.mean_period import NoiseFloor, mean_period
-from pipelines.estimation.motion import Reconstructed
-from pipelines.estimation.observers import Reconstruction, encoder_resolution, tuned_observers
+from pipelines.estimation.motion import (
+    Reconstructed,
+    Reconstruction,
+    encoder_resolution,
+    tuned_observers,
+)
 from pipelines.estimation.regression import cutoff_at, wanted_cutoff
 from pipelines.estimation.state_estimation import Observer
-from pipelines.estimation.tuning import innovations, paper_rule, smoother_bandwidth, whiteness
+from pipelines.estimation.tuning import innovations, smoother_bandwidth, whiteness
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.results import NOT_STORED
 from pipelines.io.schema import joint_unit
@@ -31,8 +35,7 @@ class ObserverResult:
     gains: Array  # (joints, order) k_i of Kostić et al. 2004, eq. (20) [1, 1/s, 1/s², ...]
     bandwidth_hz: Array  # -3 dB of the position
     measurement_std: Array  # [rad] √R
-    jerk_std: Array  # [rad/s^order] σ, as tuned or as given
-    jerk_std_paper: Array  # first guess of Kostić et al. 2004: the largest jerk of the reference
+    jerk_std: Array  # [rad/s^order] σ, as tuned or of the bandwidth that was given
 
 
 @dataclass(frozen=True)
@@ -123,67 +126,52 @@ def assess(
     """
     seen, kept, runs = measured(log, found.good), found.good.kept, found.good.runs
     tuned = found.observers or tuned_observers(seen, how)
+    causal, smoothing = tuned.causal, tuned.smoothing
     inside = np.concatenate([np.arange(run.start, run.stop) for run in runs])
-    longest = max(runs, key=lambda run: run.stop - run.start)
     error = np.full_like(seen.y, np.nan)  # Fig. 10(a)
     error[inside] = seen.y[inside] - found.motion.q[kept][inside]
-    moved = kept[inside]
-    white, correlation = _whiteness(seen, tuned.causal)
-    verdict = tuple(map(_verdict, white.tolist(), correlation.tolist()))
-    reference = found.motion.q[kept]
-    if "q_ref" in found.good.log and np.isfinite(found.good.log["q_ref"][longest]).all():
-        reference = found.good.log["q_ref"]
-    smoothing = tuned.smoothing
+    white, correlation = _whiteness(seen, causal)
     rate = 1.0 / seen.step
     cutoff = cutoff_at(wanted_cutoff(found.motion, rate), rate)
+    position, speed, acceleration = (np.median(std, axis=0) for std in found.std)
     return LogResult(
-        log.name,
-        names[0],
-        names[1],
-        how.method,
-        log.n_samples,
-        int(np.isnan(seen.y).any(axis=1).sum()),
-        tuple(joint_unit("q", joint.revolute) for joint in log.robot.joints),
-        encoder_resolution(found.good),
-        _observer(tuned.causal, paper_rule(reference[longest], seen.step, how.order)),
-        SmootherResult(
+        name=log.name,
+        source=names[0],
+        file=names[1],
+        method=how.method,
+        samples=log.n_samples,
+        predicted=int(np.isnan(seen.y).any(axis=1).sum()),
+        units=tuple(joint_unit("q", joint.revolute) for joint in log.robot.joints),
+        resolution=encoder_resolution(found.good),
+        observer=ObserverResult(
+            causal.order,
+            causal.sample_time,
+            causal.gain,
+            causal.bandwidth_hz,
+            np.sqrt(causal.noise_variance),
+            causal.jerk_std,
+        ),
+        smoother=SmootherResult(
             smoothing.jerk_std,
             np.sqrt(smoothing.noise_variance),
             smoother_bandwidth(smoothing, tuned.twice),
         )
         if how.method == "smoother"
         else None,
-        white,
-        correlation,
-        verdict,
-        np.nanmax(np.abs(error), axis=0),
-        np.sqrt(np.nanmean(error**2, axis=0)),
-        np.abs(found.motion.dq[moved]).max(axis=0),
-        np.abs(found.motion.ddq[moved]).max(axis=0),
-        *_typical_std(found),
-        mean_period(log, found, cutoff)[0],
-        _series(seen, found, error, longest) if draw else None,
-        derived,
+        innovation_whiteness=white,
+        innovation_correlation=correlation,
+        innovation_verdict=tuple(map(_verdict, white.tolist(), correlation.tolist())),
+        reconstruction_error_max=np.nanmax(np.abs(error), axis=0),
+        reconstruction_error_rms=np.sqrt(np.nanmean(error**2, axis=0)),
+        peak_speed=np.abs(found.motion.dq[kept[inside]]).max(axis=0),
+        peak_acceleration=np.abs(found.motion.ddq[kept[inside]]).max(axis=0),
+        position_std=position,
+        speed_std=speed,
+        acceleration_std=acceleration,
+        noise_floor=mean_period(log, found, cutoff)[0],
+        series=_series(seen, found, error) if draw else None,
+        log=derived,
     )
-
-
-def _observer(observer: Observer, paper: Array) -> ObserverResult:
-    return ObserverResult(
-        observer.order,
-        observer.sample_time,
-        observer.gain,
-        observer.bandwidth_hz,
-        np.sqrt(observer.noise_variance),
-        observer.jerk_std,
-        paper,
-    )
-
-
-def _typical_std(found: Reconstructed) -> tuple[Array, Array, Array]:
-    """Return the median deviation of position, speed and acceleration; NaN where there is none."""
-    none = (np.full_like(found.motion.q, np.nan),) * 3
-    q, dq, ddq = (np.median(std, axis=0) for std in found.std or none)
-    return q, dq, ddq
 
 
 def _whiteness(seen: Measured, observer: Observer) -> tuple[Array, Array]:
@@ -209,32 +197,31 @@ def _verdict(statistic: float, correlation: float) -> str:
     if correlation < _CONFIG.slight:
         words = "the motion is smoother than random jerk, the standard deviations hold"
         return f"nearly white, correlation {correlation:.2f}: {words}"
-    words = "an encoder error with a pattern, a vibration, or a jerk level that was given and does "
+    words = "an encoder error with a pattern, a vibration, or a bandwidth that was given and does "
     words += "not fit; the standard deviations may be too small"
     return f"coloured, correlation {correlation:.2f}: {words}"
 
 
-def _series(seen: Measured, found: Reconstructed, error: Array, longest: slice) -> Series:
+def _series(seen: Measured, found: Reconstructed, error: Array) -> Series:
     kept, t = seen.good.kept, seen.good.log.t
     size = max(1, -(-len(kept) // _CONFIG.buckets))
     first = np.arange(0, len(kept), size)
-    std = found.std or (np.full_like(found.motion.q, np.nan),) * 3
+    longest = max(seen.good.runs, key=lambda run: run.stop - run.start)
     shown = np.nan_to_num(error[longest][: _CONFIG.longest])
     middle = t[np.minimum(first + size // 2, len(t) - 1)]
 
     def envelope(x: Array) -> Array:
         """(2 buckets, joints): lowest and highest of each bucket, NaN where it has none."""
-        low = np.minimum.reduceat(np.where(np.isnan(x), np.inf, x), first, axis=0)
-        high = np.maximum.reduceat(np.where(np.isnan(x), -np.inf, x), first, axis=0)
-        both = np.stack([low, high], axis=1).reshape(-1, x.shape[1])
-        return np.where(np.isfinite(both), both, np.nan)
+        low = np.fmin.reduceat(x, first, axis=0)
+        high = np.fmax.reduceat(x, first, axis=0)
+        return np.stack([low, high], axis=1).reshape(-1, x.shape[1])
 
     return Series(
         np.stack([t[first], middle], axis=1).ravel(),
         envelope(error),
         envelope(found.motion.dq[kept]),
-        envelope(std[1][kept]),
+        envelope(found.std[1][kept]),
         envelope(found.motion.ddq[kept]),
-        envelope(std[2][kept]),
+        envelope(found.std[2][kept]),
         *welch(shown, 1.0 / seen.step),
     )

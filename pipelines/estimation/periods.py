@@ -3,7 +3,6 @@
 found = average_periods(x, rate, period)
 found.mean, found.noise_variance          one period, and the noise of one sample of one period
 passed_std(found.rest, amplitude)         the same noise after a filter
-found.repeats(amplitude)                  whether the periods differ by noise alone
 found.begins_apart(amplitude, least)      whether the first one starts unlike the others
 """
 
@@ -22,17 +21,6 @@ _POINTS = 6  # numerics: samples that interpolate one between them
 
 
 @dataclass(frozen=True)
-class Repeats:
-    """How far the periods in the mean are one signal, in what a filter passes. Each (channels)."""
-
-    scatter: Array  # standard deviation of one period
-    signal: Array  # of the mean period about its own mean
-    white: Array  # what the sample-to-sample noise alone would leave of the scatter
-    order: Array  # successive differences over scatter: 1 at random, less where periods drift
-    order_std: Array  # of `order`, where they do differ at random
-
-
-@dataclass(frozen=True)
 class Periods:
     """The mean period and its noise floor. `channels` are all axes of the signal but the first."""
 
@@ -46,27 +34,14 @@ class Periods:
     def count(self) -> int:
         return len(self.used)
 
-    def repeats(self, amplitude: Array) -> Repeats:
-        """Return scatter, drift and noise after a filter, `amplitude` as in `passed_std`.
+    def white_std(self, amplitude: Array) -> Array:
+        """Return the part (channels) of `passed_std` that the noise from sample to sample makes.
 
-        Where periods drift, neighbours are more alike than others: half the mean square of
-        successive differences is less than the variance (von Neumann 1941, Ann. Math. Stat. 12,
-        p. 367). Two periods cannot show it: `order` is 1.
+        The second difference removes what moves slowly; white noise has six times the variance.
         """
-        passed, m = _filtered(self.rest, amplitude), self.count
-        power = (passed**2).sum(axis=(0, 1))
-        steps = (np.diff(passed, axis=0) ** 2).sum(axis=(0, 1))
-        order = np.where(power > 0.0, 0.5 * steps / np.where(power > 0.0, power, 1.0), 1.0)
-        spectrum = (np.abs(np.fft.fft(passed, axis=1)) ** 2).sum(axis=0)
-        # independent samples of a period
-        free = spectrum.sum(axis=0) ** 2 / np.maximum((spectrum**2).sum(axis=0), 1e-300)
-        spread = np.sqrt((m - 2) / (m**2 - 1) / np.maximum(free, 1.0))
-        signal = _filtered((self.mean - self.mean.mean(axis=0))[None], amplitude)[0]
-        # the second difference removes what moves slowly; white noise has six times the variance
         bends = (np.diff(self.rest, 2, axis=1) ** 2).mean(axis=(0, 1)) / 6.0
-        white = np.sqrt(bends * m / (m - 1)) * _white_gain(amplitude, len(self.mean))
-        rms = np.sqrt((signal**2).mean(axis=0))
-        return Repeats(passed_std(self.rest, amplitude), rms, white, order, spread)
+        free = self.count / (self.count - 1)
+        return np.asarray(np.sqrt(bends * free) * _white_gain(amplitude, len(self.mean)))
 
     def begins_apart(self, amplitude: Array, least: Array) -> bool:
         """Return whether the first period starts unlike the others, as an arm from rest does.
@@ -74,22 +49,20 @@ class Periods:
         Its first tenth is held against that of the others, or of two periods against its own rest.
 
         Args:
-            amplitude: of a filter, as in `passed_std`: a start may show in what it passes alone.
+            amplitude: of a filter, as in `passed_std`.
             least: (channels) as in `average_periods`.
         """
         if self.count < 2 or self.used[0] != 0:
             return False
-        begin = max(1, self.rest.shape[1] // 10)
-        gain = _white_gain(amplitude, self.rest.shape[1])
-        for rest, floor in ((self.rest, least), (_filtered(self.rest, amplitude), gain * least)):
-            first = (rest[0, :begin] ** 2).mean(axis=0)
-            usual = (rest[0, begin:] ** 2).mean(axis=0)
-            if self.count > 2:
-                others = rest[1:, :begin] + rest[0, :begin] / (self.count - 1)
-                usual = (others**2).mean(axis=(0, 1))
-            if (first > _CONFIG.start * np.maximum(usual, np.maximum(floor**2, 1e-200))).any():
-                return True
-        return False
+        rest, begin = filtered(self.rest, amplitude), max(1, self.rest.shape[1] // 10)
+        first, usual = (rest[0, part] ** 2 for part in (slice(begin), slice(begin, None)))
+        usual = usual.mean(axis=0)
+        if self.count > 2:
+            others = rest[1:, :begin] + rest[0, :begin] / (self.count - 1)
+            usual = (others**2).mean(axis=(0, 1))
+        floor = _white_gain(amplitude, rest.shape[1]) * least
+        bound = np.maximum(usual, np.maximum(floor**2, 1e-200))
+        return bool((first.mean(axis=0) > _CONFIG.start * bound).any())
 
 
 def average_periods(
@@ -107,8 +80,7 @@ def average_periods(
     as much as the others do is left out (three periods or more needed).
 
     Args:
-        amplitude: of a filter, as in `passed_std`; a period may then be odd in what it passes
-            alone, where the noise does not hide it.
+        amplitude: of a filter, as in `passed_std`, after which periods are compared.
         least: (channels) deviation of a sample that is never odd: what counting leaves.
         without: periods, counted from 0, to leave out.
 
@@ -122,27 +94,25 @@ def average_periods(
     if not size >= 2.0:
         words = f"a period of {period:g} s at {rate:g} samples a second"
         raise UsageError("C02", words, remedy="give the period of the excitation")
-    count = int((len(x) + _CONFIG.on_sample) / size)
-    if count < 2:
+    if int((len(x) + _CONFIG.on_sample) / size) < 2:
         words = f"{len(x) / rate:.3g} s hold fewer than two periods of {period:g} s"
         remedy = "record more periods, or do without the noise floor between them"
         raise InputRejected("T07", words, remedy=remedy)
-    folded, gain = _fold(flat, size, count)
+    folded, gain = _fold(flat, size)
     if np.isnan(folded).all(axis=0).any():
         words = "a part of the period was measured in no period at all"
         raise InputRejected("D02", words, remedy="record more periods")
     odd = _outliers(folded, amplitude, np.zeros(flat.shape[1]) if least is None else least.ravel())
     outliers = tuple(sorted({*odd, *without}))
-    used = tuple(k for k in range(count) if k not in outliers)
+    used = tuple(k for k in range(len(folded)) if k not in outliers)
+    if np.isnan(folded[list(used)]).all(axis=0).any():  # an odd period alone was measured there
+        outliers, used = (), tuple(range(len(folded)))
     good = folded[list(used)]
-    if np.isnan(good).all(axis=0).any():  # an odd period is the only one that was measured there
-        outliers, used, good = (), tuple(range(count)), folded
     mean = _mean(good)
-    rest = good - mean
-    present = np.isfinite(rest)
+    present = np.isfinite(good)
     # each sample of the mean costs a degree of freedom where two periods or more were measured
     freedom = np.maximum((present.sum(axis=0) - 1).clip(0).sum(axis=0), 1)
-    rest = np.where(present, rest, 0.0)
+    rest = np.where(present, good - mean, 0.0)
     variance = ((rest**2).sum(axis=(0, 1)) / freedom / gain).reshape(x.shape[1:])
     rest = rest.reshape(*rest.shape[:2], *x.shape[1:])
     return Periods(mean.reshape(-1, *x.shape[1:]), variance, used, outliers, rest)
@@ -150,8 +120,7 @@ def average_periods(
 
 def mean_of_periods(x: Array, rate: float, period: float, used: tuple[int, ...]) -> Array:
     """Return the mean (samples of a period, channels) of the periods `used` of `x`."""
-    size = rate * period
-    return _mean(_fold(x, size, int((len(x) + _CONFIG.on_sample) / size))[0][list(used)])
+    return _mean(_fold(x, rate * period)[0][list(used)])
 
 
 def passed_std(rest: Array, amplitude: Array) -> Array:
@@ -161,20 +130,20 @@ def passed_std(rest: Array, amplitude: Array) -> Array:
         rest: (periods, samples, channels), of `Periods`.
         amplitude: (samples // 2 + 1,) what the filter passes of each harmonic, a real gain.
     """
-    power = (_filtered(rest, amplitude) ** 2).mean(axis=(0, 1))
+    power = (filtered(rest, amplitude) ** 2).mean(axis=(0, 1))
     return np.asarray(np.sqrt(power * len(rest) / (len(rest) - 1)))
 
 
-def _filtered(rest: Array, amplitude: Array) -> Array:
-    """Filter each period, its end next to its beginning."""
-    bins = np.fft.rfft(rest, axis=1)
+def filtered(x: Array, amplitude: Array) -> Array:
+    """Filter each period of `x` (periods, samples, channels), its end next to its beginning."""
+    bins = np.fft.rfft(x, axis=1)
     gain = amplitude.reshape(-1, *(1,) * (bins.ndim - 2))
-    return np.asarray(np.fft.irfft(bins * gain, rest.shape[1], axis=1))
+    return np.asarray(np.fft.irfft(bins * gain, x.shape[1], axis=1))
 
 
-def _fold(flat: Array, size: float, count: int) -> tuple[Array, float]:
+def _fold(flat: Array, size: float) -> tuple[Array, float]:
     """Return (periods, phases, channels), and what interpolation does to white noise."""
-    phases = round(size)
+    count, phases = int((len(flat) + _CONFIG.on_sample) / size), round(size)
     at = np.arange(count)[:, None] * size + np.arange(phases) * (size / phases)
     near = np.rint(at).astype(np.intp)
     if np.abs(at - near).max() <= _CONFIG.on_sample and near.max() < len(flat):
@@ -193,28 +162,25 @@ def _fold(flat: Array, size: float, count: int) -> tuple[Array, float]:
 
 
 def _mean(folded: Array) -> Array:
-    """Return the mean over the periods that were measured."""
+    """Return the mean over the periods that were measured; 0 where none was."""
     present = np.isfinite(folded)
     total = np.where(present, folded, 0.0).sum(axis=0)
     return np.asarray(total / np.maximum(present.sum(axis=0), 1))
 
 
-def _outliers(folded: Array, amplitude: Array | None, least: Array) -> tuple[int, ...]:
+def _outliers(folded: Array, amplitude: Array | None, least: Array) -> list[int]:
     """Return periods that deviate from the middle one far more, in any channel, than others."""
     if len(folded) < 3:
-        return ()
+        return []
     away = folded - np.nanmedian(folded, axis=0)
-    signals = [(away, least)]
     if amplitude is not None:
-        gain = _white_gain(amplitude, away.shape[1])
-        signals.append((_filtered(np.nan_to_num(away), amplitude), least * gain))
-    odd = np.zeros(len(folded), dtype=bool)
-    for x, floor in signals:
-        measured = np.maximum(np.isfinite(x).sum(axis=1), 1)
-        spread = np.sqrt(np.nansum(x**2, axis=1) / measured)
-        usual = np.maximum(np.median(spread, axis=0), floor)
-        odd |= (spread > _CONFIG.outlier * usual + 1e-300).any(axis=1)
-    return tuple(np.flatnonzero(odd).tolist())
+        away = filtered(np.nan_to_num(away), amplitude)
+        least = least * _white_gain(amplitude, away.shape[1])
+    measured = np.maximum(np.isfinite(away).sum(axis=1), 1)
+    spread = np.sqrt(np.nansum(away**2, axis=1) / measured)
+    usual = np.maximum(np.median(spread, axis=0), least)
+    odd = (spread > _CONFIG.outlier * usual + 1e-300).any(axis=1)
+    return np.flatnonzero(odd).tolist()
 
 
 def _white_gain(amplitude: Array, samples: int) -> float:

@@ -18,7 +18,6 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
-from pipelines.estimation.grids import through
 from pipelines.frequency.config import TurningConfig
 from pipelines.frequency.spectra import Array, Mask
 from pipelines.io.limits import GAP_LIMIT, LARGEST_JITTER, SHORTEST, percent
@@ -224,6 +223,8 @@ def _even(
     Returns signals (instants, channels), NaN in gaps that are too long; which instants lie in a
     run; the share of those of which one of the joint's `own` channels was filled.
     """
+    from scipy.interpolate import CubicSpline
+
     place = _places(good, sample_time)
     even = np.full((place[-1] + 1, signals.shape[1]), np.nan)
     even[place] = signals
@@ -235,7 +236,7 @@ def _even(
             continue
         filled += int((~np.isfinite(even[at][:, own]).all(axis=1)).sum())
         if not known.all():
-            even[at[~known]] = through(at[known], even[at[known]], at[~known])
+            even[at[~known]] = CubicSpline(at[known], even[at[known]])(at[~known])
         in_run[at] = True
     return even, in_run, filled / max(int(in_run.sum()), 1)
 

@@ -19,9 +19,8 @@ import numpy as np
 
 from pipelines.dynamics.body import Array
 from pipelines.errors import InputRejected
-from pipelines.estimation.smoother import smooth
-from pipelines.estimation.state_estimation import design
-from pipelines.estimation.tuning import tune_smoother
+from pipelines.estimation.state_estimation import design, smooth
+from pipelines.estimation.tuning import tune
 from pipelines.estimation.varpro import SeparableFit, search
 from pipelines.friction.config import RefineConfig
 from pipelines.friction.fit import LawEquations, LawFit, fit_law, ranked
@@ -144,7 +143,7 @@ def _smoothed(t: Array, q: Array, tau: Array, resolution: float, every: int, win
     whole = len(t) // every * every
     t, y = t[:whole:every], q[:whole:every]
     mean, step = tau[:whole].reshape(-1, every).mean(axis=1), float(t[1] - t[0])
-    tuned = tune_smoother(y[:, None], step, resolution, _CONFIG.order)
+    _, tuned = tune(y[:, None], step, resolution, _CONFIG.order)
     observer = design(step, tuned.jerk_std, tuned.noise_variance, _CONFIG.order)
     states = smooth(y[:, None], observer).states[..., 0]
     return Stretch("log", t, y, mean, states[0], states[1], _spoilt(t, y, mean),

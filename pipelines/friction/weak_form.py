@@ -26,9 +26,8 @@ import numpy.typing as npt
 from pipelines.dynamics.body import Array, Motion
 from pipelines.errors import InputRejected
 from pipelines.estimation.motion import Reconstructed, encoder_resolution
-from pipelines.estimation.smoother import smooth
-from pipelines.estimation.state_estimation import design
-from pipelines.estimation.tuning import tune_jerk
+from pipelines.estimation.state_estimation import design, smooth
+from pipelines.estimation.tuning import tune
 from pipelines.friction.config import WeakFormConfig
 from pipelines.friction.laws import gravity_acts, gravity_columns
 from pipelines.io.log import ExperimentLog
@@ -438,7 +437,7 @@ def _sway(found: Reconstructed, run: slice, k: int, step: float, nearer: bool) -
     rest = np.nanmedian(good.log.q[:, k])
     lean = (lean - rest)[:, None]
     try:
-        tuned = tune_jerk(lean, step, encoder_resolution(good)[[k]], KINKED)
+        tuned, _ = tune(lean, step, encoder_resolution(good)[[k]], KINKED)
     except InputRejected:
         rows = good.kept[run]
         return Sway(found.motion.q[rows, k] - rest, found.motion.dq[rows, k], nearer)

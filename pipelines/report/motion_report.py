@@ -187,7 +187,6 @@ def _tables(log: LogResult) -> list[Table]:
         "bandwidth [Hz]": o.bandwidth_hz.tolist(),
         f"encoder noise [{unit}]": o.measurement_std.tolist(),
         f"jerk σ [{unit}/s^{o.order}]": o.jerk_std.tolist(),
-        f"largest jerk [{unit}/s^{o.order}]": o.jerk_std_paper.tolist(),
         "correlation": log.innovation_correlation.tolist(),
     }
     known = {}

@@ -106,12 +106,6 @@ def test_a_disturbed_period_is_left_out_and_named() -> None:
     np.testing.assert_allclose(only(found).ratio, 1.0, atol=0.25)
 
 
-def drifting(q: Array, tau: Array) -> None:
-    """Friction of the shoulder that falls by 0.05 N m from period to period."""
-    speed = np.gradient(q[:, 1], 1e-3)
-    tau[:, 1] -= 0.05 * (np.arange(len(q)) // 10_000) * np.sign(speed)
-
-
 def loaded(q: Array, tau: Array) -> None:
     """The second half with a kilogram in the hand."""
     tau[len(q) // 2:, 1] += 9.81 * 0.4 * np.cos(q[len(q) // 2:, 1])
@@ -123,8 +117,7 @@ def other(q: Array, tau: Array) -> None:
 
 
 @pytest.mark.parametrize(("periods", "spoil", "words"), [
-    (2, loaded, "torque of joint 2"), (2, other, "motion of joint"),
-    pytest.param(4, drifting, "torque of joint 2 drifts", marks=pytest.mark.slow)])
+    (2, loaded, "torque of joint 2"), (2, other, "motion of joint")])
 def test_periods_that_are_not_alike_are_not_averaged(periods: int, spoil: object, words: str) -> None:
     found = estimated(periodic(0, periods, spoil=spoil), skip_sanity_checks=True)  # type: ignore[arg-type]
     assert not only(found).averaged

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.estimation.uneven_clock import average_held, instants
+from pipelines.estimation.grids import average_held, instants
 
 STEP, SAMPLES = 2e-3, 6000
 

@@ -8,8 +8,8 @@ from scipy.integrate import quad
 
 from benchmarks.textbook_kalman import Textbook
 from pipelines.errors import InputRejected
-from pipelines.estimation.smoother import smooth, smoothed_std, twicing_growth
-from pipelines.estimation.state_estimation import Start, design, observe
+from pipelines.estimation.motion import twicing_growth
+from pipelines.estimation.state_estimation import Start, design, observe, smooth
 from tests.seeds import rarely
 from tests.signal.chains import assert_near, exact_smoother, swing, walk, with_gaps
 
@@ -49,19 +49,17 @@ def test_states_and_deviations_against_fifty_digits(order: int, missing: list[in
     track = smooth(y, observer, Start(mean[None], covariance[None]) if known else None)
     assert_near(track.states[:3, :, 0].T, states[:, :3], 1e-9)
     assert_near(track.states[:, :, 0].T, states, 1e-8)
-    np.testing.assert_allclose(track.full_std()[:, :, 0].T, std, rtol=1e-9)
+    np.testing.assert_allclose(track.std[:, :, 0].T, std, rtol=1e-9)
 
 
 def test_middle_does_not_hear_the_ends() -> None:
-    """Standard deviations are constant away from ends and gaps, and the stretches listed are all there is to store."""
+    """Standard deviations are constant away from ends and gaps."""
     y = swing(6000, 2, STEP)
     y[3000:3003, 0] = np.nan
-    track = smooth(y, design(T, np.array([500.0, 50.0]), R))
-    reach = design(T, np.array([500.0, 50.0]), R).settled
-    std = track.full_std()
+    observer = design(T, np.array([500.0, 50.0]), R)
+    std, reach = smooth(y, observer).std, observer.settled
     far = np.concatenate([std[:, reach:3000 - reach], std[:, 3003 + reach:6000 - reach]], axis=1)
-    np.testing.assert_allclose(far, np.broadcast_to(track.std[:, None], far.shape), rtol=1e-12)
-    assert sum(piece.std.shape[1] for piece in track.stretches) <= 6 * reach + 3
+    np.testing.assert_allclose(far, np.broadcast_to(observer.smoothed_std.T[:, None], far.shape), rtol=1e-12)
 
 
 def test_claimed_deviation_is_the_real_one_and_below_the_observers() -> None:
@@ -72,8 +70,8 @@ def test_claimed_deviation_is_the_real_one_and_below_the_observers() -> None:
     observer = design(T, np.full(8, 500.0), R)
     track = smooth(y, observer)
     error = (track.states - truth)[:, 200:-200]
-    np.testing.assert_allclose(error.std(axis=(1, 2)), track.std[:, 0], rtol=0.06)
-    assert (track.std[1:, 0] < observer.std[0, 1:] / 2).all()
+    np.testing.assert_allclose(error.std(axis=(1, 2)), track.std[:, 2000, 0], rtol=0.06)
+    assert (track.std[1:, 2000, 0] < observer.std[0, 1:] / 2).all()
 
 
 def test_time_reversed_data_give_time_reversed_states() -> None:
@@ -81,7 +79,7 @@ def test_time_reversed_data_give_time_reversed_states() -> None:
     y = swing(4000, 1, STEP)
     observer = design(T, 500.0, R)
     forward, backward = smooth(y, observer).states[:, 500:-500, 0], smooth(y[::-1].copy(), observer).states[:, 500:-500, 0]
-    std = smoothed_std(observer)[:, 0]
+    std = observer.smoothed_std[0]
     assert np.sqrt(np.mean((forward[0] - backward[0, ::-1]) ** 2)) < 0.1 * std[0]
     assert np.sqrt(np.mean((forward[1] + backward[1, ::-1]) ** 2)) < 0.1 * std[1]
 
@@ -93,7 +91,7 @@ def test_any_length(samples: int) -> None:
     observer = design(T, np.array([50.0, 3770.0]), R)
     causal, both = observe(y, observer), smooth(y, observer)
     assert_near(both.states[:, -1].T, causal.states[:, -1].T, 1e-7)
-    np.testing.assert_allclose(both.full_std()[:, -1], causal.full_std()[:, -1], rtol=1e-7)
+    np.testing.assert_allclose(both.std[:, -1], causal.std[:, -1], rtol=1e-7)
 
 
 def test_infinite_measurements_are_refused() -> None:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import signal
 
-from pipelines.estimation.motion import reconstruct
-from pipelines.estimation.observers import Reconstruction
+from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.estimation.result import course, torques
 from tests.healthy import with_signal
 from tests.model.estimation.experiments import arm, experiment

@@ -7,8 +7,8 @@ import pytest
 
 from pipelines.estimation.balance import Balance, power_balance
 from pipelines.estimation.estimate import Recipe, fit_logs, motions_of
+from pipelines.estimation.motion import Reconstruction
 from pipelines.estimation.nominal import nominal_columns
-from pipelines.estimation.observers import Reconstruction
 from pipelines.io.log import Array
 from tests.model.estimation.experiments import arm, experiment, truth
 

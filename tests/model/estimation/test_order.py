@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.estimation.motion import reconstruct
-from pipelines.estimation.observers import Reconstruction
+from pipelines.estimation.motion import Reconstruction, reconstruct
 from tests.healthy import ENCODER, good_log, make_log, rest, with_signal
 from tests.model.estimation.experiments import motion_of
 
