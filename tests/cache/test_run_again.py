@@ -129,10 +129,10 @@ def test_changed_code_and_libraries(small: Path, monkeypatch: pytest.MonkeyPatch
     """P09: a module of one stage alone, and a library of all."""
     code = cache.code_of
     monkeypatch.setattr(cache, "code_of", lambda module, sources, *without: code(module, sources, *without) | (
-        {"pipelines.estimation.smoother": "other"} if module == "pipelines.reconstruct" else {}))
+        {"pipelines.estimation.motion_result": "other"} if module == "pipelines.reconstruct" else {}))
     planned = run.plan(Request((small / "logs",), out=small / "out"), SHORT)
     assert [(one.stage, one.why) for one in planned if one.computed] == [
-        ("reconstruct", "code of estimation.smoother"), ("frf", "reconstruct before it changed")]
+        ("reconstruct", "code of estimation.motion_result"), ("frf", "reconstruct before it changed")]
     monkeypatch.setattr(cache, "code_of", code)
     monkeypatch.setattr(cache, "libraries", lambda *names: {"numpy": "0.1"})
     assert all(one.computed and "numpy" in one.why for one in run.plan(Request((small / "logs",), out=small / "out"), SHORT))
