@@ -19,9 +19,9 @@ from functools import cached_property
 import numpy as np
 
 from pipelines.dynamics.arm import Acting, Arm
-from pipelines.effects.base import Effect, FrictionLaw, Values
+from pipelines.effects.base import Effect, FrictionLaw
 from pipelines.estimation.bootstrap import apart, difference
-from pipelines.estimation.exact_model import Exact, Named, Which, number_moved, slopes_of
+from pipelines.estimation.exact_model import Exact, Which, slopes_of
 from pipelines.estimation.least_squares import Flags, Indices
 from pipelines.estimation.nominal_fit import rigid_rows
 from pipelines.estimation.rows import Data
@@ -77,24 +77,22 @@ def superfluous(table: Array, wanted: Sequence[int], least: float) -> list[int]:
     that are nearly the same one stays (pivoting, as in Golub & Van Loan 2013, ch. 5.4).
     """
     unit, _ = _unit(table)
-    gram, left = unit @ unit.T, list(wanted)
-    gone: list[int] = []
+    gram, left, gone = unit @ unit.T, list(wanted), list[int]()
+
+    def own_part(place: int) -> float:
+        """Return the part of a unit column that no combination of the others is, without `gone`."""
+        others = np.setdiff1d(np.arange(len(gram)), [place, *gone])
+        values, vectors = _seen(gram[np.ix_(others, others)])
+        along = vectors.T @ gram[others, place]
+        return float(np.clip(gram[place, place] - along @ (along / values), 0.0, 1.0))
+
     while left:
-        seen = [_own_part(gram, place, gone) for place in left]
+        seen = [own_part(place) for place in left]
         lowest = int(np.argmin(seen))
-        if seen[lowest] >= least:
+        if seen[lowest] >= least**2:
             break
         gone.append(left.pop(lowest))
     return gone
-
-
-def _own_part(gram: Array, place: int, gone: Sequence[int]) -> float:
-    """Return the part of a unit column that no combination of the others is, without `gone`."""
-    others = np.ones(len(gram), dtype=bool)
-    others[[place, *gone]] = False
-    values, vectors = _seen(gram[np.ix_(others, others)])
-    along = vectors.T @ gram[others, place]
-    return float(np.sqrt(np.clip(gram[place, place] - float(along @ (along / values)), 0.0, 1.0)))
 
 
 def covariance(table: Array, residual: Array) -> Array:
@@ -133,8 +131,7 @@ def left_out(table: Array, residual: Array, blocks: Indices) -> Array:
     for block in range(int(blocks.max()) + 1):
         own = unit[:, blocks == block]
         values, vectors = _seen(gram - own @ own.T, _ALONE)
-        score = vectors.T @ (own @ residual[blocks == block])
-        moved.append((vectors / values) @ score)
+        moved.append((vectors / values) @ (vectors.T @ (own @ residual[blocks == block])))
     return np.asarray(np.sqrt((len(moved) - 1.0) * np.var(moved, axis=0)) / size)
 
 
@@ -172,7 +169,7 @@ class Refined:
         """(rows,) weighted."""
         return np.asarray(self.left * self.weights)
 
-    @cached_property
+    @property
     def rss(self) -> float:
         """Squared weighted residual."""
         return float(self.residual @ self.residual)
@@ -182,10 +179,10 @@ class Refined:
         """(joints,) [N m]."""
         return self.data.rms(self.left)
 
-    def of_effect(self, place: int) -> list[int]:
-        """Return the slopes that belong to effect number `place`."""
+    def numbers_of(self, kind: int, place: int) -> list[tuple[int, str]]:
+        """Return the slopes of law (kind 0) or effect (1) number `place`, and their names."""
         names = enumerate(self.names, len(self.model.beta))
-        return [k for k, (kind, which, _) in names if kind == 1 and which == place]
+        return [(k, name) for k, (own, which, name) in names if (own, which) == (kind, place)]
 
     @cached_property
     def unseen(self) -> list[int]:
@@ -207,13 +204,12 @@ class Refined:
 
     @cached_property
     def _own_covariance(self) -> Array:
-        seen = np.ones(len(self.slopes), dtype=bool)
-        seen[self.unseen] = False
+        seen = np.setdiff1d(np.arange(len(self.slopes)), self.unseen)
         table, residual = (self.slopes * self.weights)[seen], self.residual
         noise = covariance(table, residual)
         std = np.sqrt(np.maximum(np.diag(noise), 1e-300))
         wider = np.maximum(left_out(table, residual, self.data.blocks(_PARTS)) / std, 1.0)
-        whole = np.zeros((len(seen), len(seen)))
+        whole = np.zeros((len(self.slopes), len(self.slopes)))
         whole[np.ix_(seen, seen)] = noise * wider * wider[:, None]
         whole.flags.writeable = False
         return whole
@@ -221,45 +217,38 @@ class Refined:
 
 def refine(model: Exact, data: Data, weight: Array, steps: int = _STEPS) -> Refined:
     """Fit by Gauss-Newton with halved steps until the weighted residual no longer falls."""
-    with np.errstate(all="ignore"):  # a step too far may run away: it is not taken then
-        return _refined(model, data, weight, steps)
-
-
-def _refined(model: Exact, data: Data, weight: Array, steps: int) -> Refined:
     y, weights = data.y, weight[data.joint]
     rigid = rigid_rows(data, model.columns)
 
-    def residual_of(one: Exact) -> tuple[Array, Array, list[Array]]:
+    def seen(one: Exact) -> tuple[Exact, Array, float, list[Array]]:
         laid = one.laid(data)
         left = y - one.torque(data, laid)
-        return left, (left * weights) @ (left * weights), laid
+        return one, left, float(np.square(left * weights).sum()), laid
 
-    model = replace(model, beta=dissipating(model.beta, model.columns.laws))
-    left, now, laid = residual_of(model)
-    slopes, names = slopes_of(model, data, rigid, laid)
-    for _ in range(steps):
-        better, table = None, slopes * weights
+    def better() -> tuple[Exact, Array, float, list[Array]] | None:
         for ridge in _RIDGES:
             try:
-                shift = _within(model, names, table, left * weights, ridge)
+                shift = _within(now[0], names, slopes * weights, now[1] * weights, ridge)
             except np.linalg.LinAlgError:  # of numbers at which nothing can be solved: they stay
-                break
+                return None
             for share in _SHARES:
-                moved = model.moved(share * shift, names)
-                tried = residual_of(moved)
-                if tried[1] < now:
-                    better = moved
-                    break
-            if better is not None:
+                tried = seen(now[0].moved(share * shift, names))
+                if tried[2] < now[2]:
+                    return tried
+        return None
+
+    with np.errstate(all="ignore"):  # a step too far may run away: it is not taken then
+        now = seen(replace(model, beta=dissipating(model.beta, model.columns.laws)))
+        slopes, names = slopes_of(now[0], data, rigid, now[3])
+        for _ in range(steps):
+            found = better()
+            if found is None:
                 break
-        if better is None:
-            break
-        gained, model = 1.0 - tried[1] / now, better
-        left, now, laid = tried
-        slopes, names = slopes_of(model, data, rigid, laid)
-        if gained < _GAIN:
-            break
-    return Refined(model, data, weight, left, slopes, tuple(names))
+            gained, now = 1.0 - found[2] / now[2], found
+            slopes, names = slopes_of(now[0], data, rigid, now[3])
+            if gained < _GAIN:
+                break
+    return Refined(now[0], data, weight, now[1], slopes, tuple(names))
 
 
 def _within(model: Exact, names: list[Which], table: Array, y: Array, ridge: float) -> Array:
@@ -272,8 +261,11 @@ def _within(model: Exact, names: list[Which], table: Array, y: Array, ridge: flo
     first, laws = len(model.beta), model.columns.laws
     stuck = _superfluous(table, first, names)
     shift = _without(table, y, ridge, stuck)
-    ends = enumerate(names, first)
-    beyond = [k for k, which in ends if _beyond(model, which, float(shift[k]))]
+    beyond = []
+    for k, (kind, place, name) in enumerate(names, first):
+        effect = laws[place] if kind == 0 else model.effects[place].effect
+        if not name.isdigit() and effect.at_end(name, float(shift[k])):
+            beyond.append(k)
     held = driving(model.beta, shift, laws)
     while beyond or held:
         fixed = y + model.beta[held] @ table[held]
@@ -293,67 +285,48 @@ def _superfluous(table: Array, first: int, names: Sequence[Which]) -> list[int]:
 
 
 def _without(table: Array, y: Array, ridge: float, stuck: list[int]) -> Array:
-    free = np.ones(len(table), dtype=bool)
-    free[stuck] = False
+    free = np.setdiff1d(np.arange(len(table)), stuck)
     shift = np.zeros(len(table))
     shift[free] = solved(table[free], y, ridge)
     return shift
 
 
-def _beyond(model: Exact, which: Which, by: float) -> bool:
-    """Return whether a shape is at the end of its range, and `by` points out of it."""
-    kind, place, name = which
-    if name.isdigit():
-        return False
-    effect = model.columns.laws[place] if kind == 0 else model.effects[place].effect
-    return effect.at_end(name, by)
-
-
 def acting(done: Refined, place: int, finite: bool = False) -> Acting:
     """Return effect number `place` with its numbers and their deviations.
 
-    To first order (the delta method) √(s C sᵀ), with slopes s and the covariance C of all numbers
-    of the model; ∞ of what follows mostly from a number that these logs do not tell from others.
+    To first order (the delta method) √(s C sᵀ), with slopes s, by one number after the other moved
+    a little, and the covariance C of all numbers of the model; ∞ of what follows mostly from a
+    number that these logs do not tell from others.
 
     Args:
         finite: without those that are infinite, as a model has them.
     """
     one, revolute = done.model.effects[place], done.model.columns.body.robot.revolute
     turning = one.effect.joint is None or revolute[one.effect.joint - 1]
-    index = done.of_effect(place)
-    covariance = done.covariance()[np.ix_(index, index)]
-    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()
+    own = done.numbers_of(1, place)
+    index = [k for k, _ in own]
+    known = done.covariance()[np.ix_(index, index)]
     steps, moved = [], []
-    for k, known in zip(index, deviations, strict=True):
-        name, size = done.names[k - len(done.model.beta)][2], 1.0
+    for (_, name), variance in zip(own, np.diag(known), strict=True):
+        size = 1.0
         if name.isdigit():
-            size = max(abs(one.amplitudes[int(name)]), known) or 1.0
+            deviation = float(np.sqrt(max(variance, 0.0)))
+            size = max(abs(one.amplitudes[int(name)]), deviation) or 1.0
         steps.append(_STEP * size)
-        moved.append(number_moved(one, name, steps[-1]).values)
-    hidden = np.isin(index, done.unseen)
-    std = _by_slopes(one, moved, np.array(steps), covariance, hidden)
-    std = {name: x for name, x in std.items() if np.isfinite(x) or not finite}
-    return Acting.of(one.effect, one.values, std, revolute=turning)
-
-
-def _by_slopes(
-    one: Named, moved: Sequence[Values], steps: Array, covariance: Array, unseen: Flags
-) -> dict[str, float]:
-    """Return the deviations by the values with one number after the other moved by its step.
-
-    Infinite where a number that these logs do not tell moves it more than all others.
-    """
-    found = {}
+        moved.append(one.moved(name, steps[-1]).values)
+    unseen, std = np.isin(index, done.unseen), {}
     for q in one.effect.parameters:
         value = one.values[q.name]
         slope = np.array([difference(value, there[q.name], q.period) for there in moved]) / steps
         if not slope.any() or not np.isfinite(slope).all():
             continue
-        size = np.abs(slope)
-        hidden = np.where(unseen, size, 0.0).max() > np.where(unseen, 0.0, size).max()
-        variance = max(float(slope @ covariance @ slope), 0.0)
-        found[q.name] = np.inf if hidden else float(np.sqrt(variance))
-    return found
+        share = np.abs(slope)
+        hidden = np.where(unseen, share, 0.0).max() > np.where(unseen, 0.0, share).max()
+        if not hidden:
+            std[q.name] = float(np.sqrt(max(float(slope @ known @ slope), 0.0)))
+        elif not finite:
+            std[q.name] = np.inf
+    return Acting.of(one.effect, one.values, std, revolute=turning)
 
 
 def with_uncertainty(arm: Arm, done: Refined) -> Arm:
@@ -362,21 +335,19 @@ def with_uncertainty(arm: Arm, done: Refined) -> Arm:
     The shape of a law moves by its logarithm.
     """
     std = np.sqrt(np.maximum(np.diagonal(done.covariance()), 0.0)).tolist()
-    columns, count = done.model.columns, len(done.model.beta)
+    columns = done.model.columns
     place = {i: k for k, i in enumerate(columns.kept)}
     numbered = enumerate(arm.base)
     base = tuple(replace(p, std=std[place[i]]) if i in place else p for i, p in numbered)
-    linear = [
-        (k, q.name) for k, law in enumerate(columns.laws) for q in law.parameters if not q.shape
-    ]
-    known = dict(zip(linear, std[len(columns.kept) : count], strict=True))
-    for (kind, k, name), own in zip(done.names, std[count:], strict=True):
-        if kind == 0 and own > 0.0:
-            known[k, name] = own * abs(getattr(columns.laws[k], name))
     laws = [k for k, law in enumerate(columns.laws) if isinstance(law, FrictionLaw)]
     friction = []
     for k, law in zip(laws, arm.friction, strict=True):
-        own = tuple(replace(p, std=known.get((k, p.name), p.std)) for p in law.parameters)
+        linear = (q.name for q in columns.laws[k].parameters if not q.shape)
+        known = dict(zip(linear, std[columns.parts[k]], strict=True))
+        for number, name in done.numbers_of(0, k):
+            if std[number] > 0.0:
+                known[name] = std[number] * abs(getattr(columns.laws[k], name))
+        own = tuple(replace(p, std=known.get(p.name, p.std)) for p in law.parameters)
         friction.append(replace(law, parameters=own))
     return replace(arm, base=base, friction=tuple(friction))
 

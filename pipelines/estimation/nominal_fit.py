@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.effects.base import ArmModel, Effect, Quantity, plainer
+from pipelines.effects.base import ArmModel, Effect, plainer
 from pipelines.estimation.regression import Columns
 from pipelines.estimation.rows import Data
 from pipelines.io.log import Array
@@ -26,6 +26,7 @@ _ROUNDS = 6  # numerics: of weights
 _SETTLED = 1e-3  # numerics: of a weight
 _STEPS = 6  # numerics: of Gauss-Newton
 _FINE = 1e-3  # numerics: of ln shape, where it ends
+_FARTHEST = 0.3  # numerics: of the same, in a step
 _STEP = 0.01  # numerics: of a difference
 
 
@@ -52,8 +53,7 @@ class Fit:
     @cached_property
     def residual(self) -> Array:
         """(rows,) weighted."""
-        y = self.y * self.weights
-        return np.asarray(y - (self.basis @ y) @ self.basis)
+        return self.project(self.y)
 
     @cached_property
     def left(self) -> Array:
@@ -75,47 +75,39 @@ def _orthonormal(table: Array) -> Array:
     """Return orthonormal rows (rank, n) that span those of `table`: by the Gram matrix, twice."""
     norm = np.linalg.norm(table, axis=1)
     basis: Array = table[norm > 0.0] / norm[norm > 0.0, None]
-    for first in (True, False):
-        if not len(basis):
-            break
-        values, vectors = np.linalg.eigh(basis @ basis.T)
-        keep = values > _RANK * values[-1] if first else np.ones(len(values), dtype=bool)
-        basis = (vectors[:, keep] / np.sqrt(values[keep])).T @ basis
-    return np.asarray(basis)
+    for rank in (_RANK, 0.0):
+        if len(basis):
+            values, vectors = np.linalg.eigh(basis @ basis.T)
+            keep = values > rank * values[-1]
+            basis = (vectors[:, keep] / np.sqrt(values[keep])).T @ basis
+    return basis
 
 
 def fit_columns(data: Data, table: Array) -> Fit:
     """Solve least squares with joints weighted by their own residual, found in turns."""
-    target, joints = data.y, range(data.n_joints)
+    y, joints = data.y, [data.joint == j for j in range(data.n_joints)]
     scale = np.linalg.norm(table, axis=1)
     scale = np.where(scale > 0.0, scale, 1.0)
     unit = table / scale[:, None]
-    grams = [unit[:, data.joint == j] @ unit[:, data.joint == j].T for j in joints]
-    moments = [unit[:, data.joint == j] @ target[data.joint == j] for j in joints]
-    powers = np.array([np.sum(target[data.joint == j] ** 2) for j in joints])
+    grams = np.array([unit[:, own] @ unit[:, own].T for own in joints])
+    moments = np.array([unit[:, own] @ y[own] for own in joints])
+    powers = np.array([y[own] @ y[own] for own in joints])
     counts = np.maximum(np.bincount(data.joint[data.counts], minlength=data.n_joints), 1)
-    w = np.ones(data.n_joints)
-    beta = _solved(grams, moments, w)
-    for _ in range(_ROUNDS):
-        parts = zip(powers, moments, grams, strict=True)
-        rss = np.array([p - 2.0 * beta @ m + beta @ g @ beta for p, m, g in parts])
-        sigma = np.sqrt(np.maximum(rss, 1e-12 * powers) / counts)
-        before, w = w, 1.0 / np.maximum(sigma, 1e-12 * (sigma.max() or 1.0))
-        beta = _solved(grams, moments, w)
-        if np.abs(w / before - 1.0).max() < _SETTLED:
+    weight, before = np.ones(data.n_joints), np.full(data.n_joints, np.inf)
+    for left in reversed(range(_ROUNDS + 1)):
+        gram = np.tensordot(weight**2, grams, 1)
+        size = np.sqrt(np.diag(gram))
+        size = np.where(size > 0.0, size, np.inf)  # a column of zeros has the number 0
+        values, vectors = np.linalg.eigh(gram / size / size[:, None])
+        keep = values > _RANK * values[-1]
+        projected = vectors[:, keep].T @ (weight**2 @ moments / size)
+        beta = (vectors[:, keep] / values[keep]) @ projected / size
+        if not left or np.abs(weight / before - 1.0).max() < _SETTLED:
             break
-    return Fit(data, table, target, w, beta / scale)
-
-
-def _solved(grams: list[Array], moments: list[Array], weight: Array) -> Array:
-    gram = sum(w**2 * g for w, g in zip(weight, grams, strict=True))
-    moment = sum(w**2 * m for w, m in zip(weight, moments, strict=True))
-    size = np.sqrt(np.diag(gram))
-    size = np.where(size > 0.0, size, np.inf)  # a column of zeros has the number 0
-    values, vectors = np.linalg.eigh(gram / size / size[:, None])
-    keep = values > _RANK * values[-1]
-    projected = vectors[:, keep].T @ (moment / size)
-    return np.asarray((vectors[:, keep] / values[keep]) @ projected / size)
+        rss = powers - 2.0 * moments @ beta + grams @ beta @ beta
+        sigma = np.sqrt(np.maximum(rss, 1e-12 * powers) / counts)
+        before, weight = weight, 1.0 / np.maximum(sigma, 1e-12 * (sigma.max() or 1.0))
+    return Fit(data, table, y, weight, np.asarray(beta / scale))
 
 
 def rows_of(data: Data, columns: Columns) -> Array:
@@ -173,46 +165,45 @@ def fit_nominal(data: Data, columns: Columns) -> tuple[Columns, Fit]:
     columns = replace(columns, laws=tuple(laws))
     for _ in range(_STEPS):
         slopes, names = law_slopes(data, columns, fit.beta)
-        base = np.concatenate([rigid, *(law_rows(data, law, columns) for law in columns.laws)])
-        fit = fit_columns(data, np.concatenate([base, *slopes]))
-        shift = np.clip(fit.beta[len(base) :], -0.3, 0.3)
+        fit = fit_columns(data, np.concatenate([rows_of(data, columns), *slopes]))
+        shift = np.clip(fit.beta[len(columns.names) :], -_FARTHEST, _FARTHEST)
         if not len(shift) or np.abs(shift).max() < _FINE:
             break
         laws = list(columns.laws)
         for (place, name), by in zip(names, shift, strict=True):
-            laws[place] = _moved(laws[place], name, float(np.exp(by)))
+            laws[place] = _times(laws[place], name, float(np.exp(by)))
         columns = replace(columns, laws=tuple(laws))
     return columns, fit
 
 
-def _free(law: Effect) -> list[Quantity]:
-    return [q for q in law.parameters if q.name in law.free and q.low > 0.0]
+def _free(law: Effect) -> list[str]:
+    return [q.name for q in law.parameters if q.name in law.free and q.low > 0.0]
 
 
-def _moved(law: Effect, name: str, factor: float) -> Effect:
-    """Return `law` with one shape multiplied, as far as its range allows."""
-    quantity = next(q for q in law.parameters if q.name == name)
-    value = np.clip(getattr(law, name) * factor, quantity.low, quantity.high)
-    shape: dict[str, Any] = {name: float(value)}
-    return replace(law, **shape)
+def with_shape(effect: Effect, name: str, value: float) -> Effect:
+    """Return the effect with one shape changed, as far as its range allows."""
+    shape: dict[str, Any] = {name: effect.within(name, value)}
+    return replace(effect, **shape)
+
+
+def _times(law: Effect, name: str, factor: float) -> Effect:
+    return with_shape(law, name, factor * float(getattr(law, name)))
 
 
 def law_slopes(
-    data: Data, columns: Columns, all_beta: Array
+    data: Data, columns: Columns, beta: Array
 ) -> tuple[list[Array], list[tuple[int, str]]]:
     """Return the slope (1, rows) of the torque by the logarithm of each free shape, and which.
 
     Of a law that takes no torque none, for it has no shape.
     """
-    counts = [sum(not q.shape for q in law.parameters) for law in columns.laws]
-    amplitudes = np.split(all_beta[len(columns.kept) :], np.cumsum(counts))[:-1]
     slopes, shapes = list[Array](), list[tuple[int, str]]()
-    for place, (law, beta) in enumerate(zip(columns.laws, amplitudes, strict=True)):
-        for quantity in _free(law) if beta.any() else ():
-            moved = (_moved(law, quantity.name, factor) for factor in (1.0 + _STEP, 1.0 - _STEP))
+    for place, (law, part) in enumerate(zip(columns.laws, columns.parts, strict=True)):
+        for name in _free(law) if beta[part].any() else ():
+            moved = (_times(law, name, factor) for factor in (1.0 + _STEP, 1.0 - _STEP))
             up, down = (law_rows(data, one, columns) for one in moved)
-            slopes.append((beta @ (up - down))[None] / (2.0 * _STEP))
-            shapes.append((place, quantity.name))
+            slopes.append((beta[part] @ (up - down))[None] / (2.0 * _STEP))
+            shapes.append((place, name))
     return slopes, shapes
 
 
@@ -225,8 +216,8 @@ def _best_of_grid(data: Data, law: Effect, columns: Columns, rest: Fit) -> tuple
 
     def gain(table: Array) -> float:
         c = rest.project(table)
-        solved, *_ = np.linalg.lstsq(c @ c.T, c @ rest.residual, rcond=1e-10)
-        return float(solved @ (c @ rest.residual))
+        moment = c @ rest.residual
+        return float(np.linalg.lstsq(c @ c.T, moment, rcond=1e-10)[0] @ moment)
 
     grid = law.shapes(data.logs[0].motion, columns.arm)
     shapes = (law, *grid) if plainer(law) else grid
