@@ -24,7 +24,6 @@ from pipelines.effects.base import Effect, everywhere
 from pipelines.errors import UsageError
 from pipelines.estimation.least_squares import Indices
 from pipelines.estimation.rows import Data, LogData
-from pipelines.io.log import Array
 
 Table = npt.NDArray[np.floating]  # in single precision: there are many, and none is fitted
 
@@ -107,12 +106,9 @@ def whole_motion(data: Data) -> Motion:
     q, dq, ddq = (
         np.concatenate([getattr(motion, name) for motion in motions]) for name in ("q", "dq", "ddq")
     )
-    step = max(motion.sample_time for motion in motions)
-    whole = Motion(t, q, dq, ddq, log_sample_time=step)
     commands = [motion.tau for motion in motions if motion.tau is not None]
-    if len(commands) < len(motions):
-        return whole
-    return replace(whole, tau=np.concatenate(commands))
+    tau = np.concatenate(commands) if len(commands) == len(motions) else None
+    return Motion(t, q, dq, ddq, tau, log_sample_time=max(m.sample_time for m in motions))
 
 
 def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
@@ -122,49 +118,35 @@ def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
     size = max(1, _AT_ONCE // max(width, 1))
     for first in range(0, len(family.shapes), size):
         some = family.shapes[first : first + size]
-        joint = some[0].joint if some[0].from_motion else None
         with np.errstate(all="ignore"):
-            if joint is not None:
-                acting = np.arange(data.n_joints) == joint - 1
-                parts = [_laid_own(one, some, joint, arm) for one in data.logs]
-            else:
-                laid = [_laid_anywhere(one, some, arm) for one in data.logs]
-                joints = range(data.n_joints)
-                acting = np.array([any(x[:, :, j].any() for x in laid) for j in joints])
-                parts = [x[:, :, acting].reshape(*x.shape[:2], -1) for x in laid]
-        rows = np.flatnonzero(acting[data.joint])
+            laid = [_laid(one, some, arm) for one in data.logs]
+        acting = np.unique(np.concatenate([joints for joints, _ in laid]))
+        parts = []
+        for joints, table in laid:
+            whole = np.zeros((*table.shape[:2], len(acting), table.shape[3]), np.float32)
+            whole[:, :, np.searchsorted(acting, joints)] = table
+            parts.append(whole.reshape(*table.shape[:2], -1))
+        rows = np.flatnonzero(np.isin(data.joint, acting))
         yield Laid(first, data.clear(np.concatenate(parts, axis=2), rows), rows)
 
 
-def _laid_own(one: LogData, some: Sequence[Effect], joint: int, arm: Arm) -> Table:
-    """(shapes, k, rows of the joint) of effects that act on it alone."""
-    table = some[0].own_columns(some, one.motion, arm)
-    for shape in table:
-        shape[...] = _finite(shape)
-    flat = table.reshape(-1, table.shape[2]).astype(np.float32)
-    rows = one.lay_signals(flat, np.full(len(flat), joint - 1))
-    return rows.reshape(len(some), table.shape[1], -1)
-
-
-def _laid_anywhere(one: LogData, some: Sequence[Effect], arm: Arm) -> Table:
-    """(shapes, k, joints, rows)"""
-    every = some[0].several(some, one.motion, arm)
-    tables = [_finite(table).transpose(2, 1, 0) for table in every]
-    k, joints, samples = tables[0].shape
-    anywhere = [any(table[:, j].any() for table in tables) for j in range(joints)]
-    acting = np.flatnonzero(anywhere)
-    flat = np.empty((len(some), k, len(acting), samples), np.float32)
+def _laid(one: LogData, some: Sequence[Effect], arm: Arm) -> tuple[Indices, Table]:
+    """Return the joints that some shapes act on, and (shapes, k, joints, rows) there."""
+    if some[0].from_motion and some[0].joint is not None:
+        own = np.array([some[0].index])
+        tables = list(some[0].own_columns(some, one.motion, arm)[:, :, None])
+    else:
+        every = [t.transpose(2, 1, 0) for t in some[0].several(some, one.motion, arm)]
+        joints = range(every[0].shape[1])
+        own = np.flatnonzero([any(table[:, j].any() for table in every) for j in joints])
+        tables = [table[:, own] for table in every]
+    flat = np.zeros((len(some), *tables[0].shape), np.float32)
     for into, table in zip(flat, tables, strict=True):
-        into[...] = table[:, acting]
-    found = np.zeros((len(some), k, joints, one.rows), np.float32)
-    laid = one.lay_signals(flat.reshape(-1, samples), np.tile(acting, len(some) * k))
-    found[:, :, acting] = laid.reshape(len(some), k, len(acting), one.rows)
-    return found
-
-
-def _finite(table: Array) -> Array:
-    """Return zeros for columns that run away, of an arm that is badly known."""
-    return table if bool((np.abs(table) < _AWAY).all()) else np.zeros_like(table)
+        if (np.abs(table) < _AWAY).all():  # of an arm that is badly known a column may run away
+            into[...] = table
+    shapes, k, count, samples = flat.shape
+    laid = one.lay_signals(flat.reshape(-1, samples), np.tile(own, shapes * k))
+    return own, laid.reshape(shapes, k, count, one.rows)
 
 
 def first_samples(data: Data) -> Motion:
@@ -182,30 +164,19 @@ def usable(
     Raises:
         UsageError: C02, it cannot.
     """
-    if mine is None:
-        why, remedy = _missing(one, laws, revolute)
-        raise UsageError("C02", f"{one.place}: {why}", "--with", remedy)
-    if mine.event:
-        words = f"{one.place} happens once: no model of the arm holds it"
-        raise UsageError("C02", words, "--with", "leave the moment out of the logs instead")
-    return mine
-
-
-def _missing(one: Wanted, laws: Sequence[Effect], revolute: Sequence[bool]) -> tuple[str, str]:
-    """Return why nothing can be fitted there, and what to do."""
     effect = one.effect
-    if effect.name in {law.name for law in laws}:
-        remedy = "name a cause that the nominal model lacks"
-        return "the nominal model has it already", remedy
-    if effect.evidence == "none":
-        words = "it is a law of friction for a nominal model, and no cause"
-        return words, "extend a model that has it: --model FILE"
-    if effect.evidence == "base parameters":
-        words = "the base parameters take it up, and no reference logs show that they moved as it "
-        return f"{words}moves them", "name reference logs from before it: --reference PATH"
-    others = everywhere(type(effect), revolute)
-    places = [place_of(other.name, other.joint) for other in others]
-    remedy = "name another cause: no place of this arm has it"
-    if places:
-        remedy = f"write {' or '.join(places)}"
-    return "this arm does not have it there", remedy
+    if mine is not None and not mine.event:
+        return mine
+    if mine is not None:
+        why, remedy = "it happens once: no model of the arm holds it", "leave its moment out"
+    elif effect.name in {law.name for law in laws}:
+        why, remedy = "the nominal model has it already", "name a cause that it lacks"
+    elif effect.evidence == "none":
+        why, remedy = "it is a law of friction, and no cause", "extend a model that has it: --model"
+    elif effect.evidence == "base parameters":
+        why = "no reference logs show that the base parameters moved as it moves them"
+        remedy = "name reference logs from before it: --reference PATH"
+    else:
+        places = (place_of(o.name, o.joint) for o in everywhere(type(effect), revolute))
+        why, remedy = "this arm does not have it there", f"write {' or '.join(places) or 'another'}"
+    raise UsageError("C02", f"{one.place}: {why}", "--with", remedy)

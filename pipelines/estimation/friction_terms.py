@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -43,23 +42,25 @@ def with_terms_told_apart(prepared: Prepared, blocks: int) -> Prepared:
     if not any(plainer(law) for law in given.laws):
         return prepared
     now = _Rungs(given, prepared.data, blocks)
-    before = now if prepared.reference is None else _Rungs(given, prepared.reference, blocks)
-    laws: list[Effect] = []
-    fewer: list[FewerTerms] = []
+    before = None if prepared.reference is None else _Rungs(given, prepared.reference, blocks)
+    laws, fewer = list[Effect](), list[FewerTerms]()
     for law in given.laws:
         if not plainer(law):
             laws.append(law)
             continue
-        # logs of the time before judge where they drive the joint as long and as fast
-        (many, fast), (many_now, fast_now) = (_driven(x.data, _row(law)) for x in (before, now))
-        long = many > 0 and many >= _CONFIG.long * many_now
-        rungs = before if long and fast >= _CONFIG.fast * fast_now else now
+        rungs = now if before is None or not _drives_as_much(before, now, law) else before
         rung = rungs.chosen(law)
         laws += rungs.laws_for(law, rung)
         if rung:
-            taken, why = plainer(law)[rung - 1], rungs.why(law, rung)
-            fewer.append(FewerTerms(law.joint, law.name, taken, why))
+            why = rungs.unclear(law, 0) or _AS_LITTLE
+            fewer.append(FewerTerms(law.joint, law.name, plainer(law)[rung - 1], why))
     return replace(prepared, columns=replace(given, laws=tuple(laws)), fewer=tuple(fewer))
+
+
+def _drives_as_much(before: _Rungs, now: _Rungs, law: Effect) -> bool:
+    """Return whether logs of the time before drive a joint about as long and as fast."""
+    (many, fast), (many_now, fast_now) = (_driven(one.data, _row(law)) for one in (before, now))
+    return 0 < many >= _CONFIG.long * many_now and fast >= _CONFIG.fast * fast_now
 
 
 def _driven(data: Data, row: int) -> tuple[int, float]:
@@ -70,63 +71,22 @@ def _driven(data: Data, row: int) -> tuple[int, float]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Rung:
-    """One fit, and what it leaves of blocks of time that are held out in turn."""
-
-    done: Refined
-    blocks: int
-
-    @cached_property
-    def left(self) -> Array:
-        """(rows,) [N m] of every block by the numbers of the others, to first order."""
-        table, residual = self.done.slopes * self.done.weights, self.done.residual
-        size = np.linalg.norm(table, axis=1)
-        unit = table / np.where(size > 0.0, size, 1.0)[:, None]
-        left, gram, moment = np.empty_like(residual), unit @ unit.T, unit @ residual
-        ridge, place = 1e-9 * np.eye(len(gram)), self.done.data.blocks(self.blocks)
-        for block in range(int(place.max()) + 1):
-            held = place == block
-            own = unit[:, held]
-            rest = moment - own @ residual[held]
-            solved = np.linalg.solve(gram - own @ own.T + ridge, rest)
-            left[held] = residual[held] - solved @ own
-        return left / self.done.weights
-
-    def power(self, row: int) -> float:
-        """Return Σ r² of a joint, from 0 [N² m²]."""
-        return float(self.done.data.power(self.left)[0][row])
-
-    def clearly_less(self, other: _Rung, row: int) -> bool:
-        """Return whether it leaves less than `other`: by a hundredth of the squares and beyond
-        chance, or by a great part of them and a standard error.
-
-        Beyond chance alone would leave a dip in the waves over the angle that it is added to: they
-        make blocks differ far more than the law does.
-        """
-        less = self.power(row) / max(other.power(row), 1e-300)
-        if less >= _CONFIG.worth:
-            return False
-        gain = torque_gain_of(self.done.data, other.left, self.left)
-        by, high = float(gain.before[row] - gain.after[row]), float(gain.ci95[row][1])
-        return high < 0.0 or (less < _CONFIG.much and 0.5 * (high + by) < by)
-
-
-@dataclass(frozen=True, eq=False)
 class _Rungs:
     """Fits of all laws as given, then of each with fewer and fewer terms: each once it is used."""
 
     given: Columns
     data: Data
     blocks: int
-    _made: dict[int, _Rung] = field(default_factory=dict)
+    _made: dict[int, tuple[Refined, Array]] = field(default_factory=dict)
 
-    def at(self, rung: int) -> _Rung:
+    def at(self, rung: int) -> tuple[Refined, Array]:
+        """Return a fit, and the residual (rows,) [N m] of each block by the numbers of others."""
         if rung not in self._made:
             given = self.given.laws
             laws = tuple(one for law in given for one in _on(law, rung, given))
             columns, fit = fit_nominal(self.data, replace(self.given, laws=laws))
             done = refine(Exact.start(columns, fit), self.data, fit.weight)
-            self._made[rung] = _Rung(done, self.blocks)
+            self._made[rung] = done, _left(done, self.blocks)
         return self._made[rung]
 
     def chosen(self, law: Effect) -> int:
@@ -135,31 +95,54 @@ class _Rungs:
         The last is taken whatever is known of it.
         """
         last, row = len(plainer(law)), _row(law)
-        able = [rung for rung in range(last) if not self._unclear(law, rung)] + [last]
-        best = self.at(min(able, key=lambda rung: self.at(rung).power(row)))
-        return max(rung for rung in able if not best.clearly_less(self.at(rung), row))
+        able = [rung for rung in range(last) if not self.unclear(law, rung)] + [last]
+        best = min(able, key=lambda rung: self._power(rung, row))
+        return max(rung for rung in able if not self._clearly_less(best, rung, row))
 
-    def why(self, law: Effect, chosen: int) -> str:
-        """Return what speaks against the law as given, and against others that were not taken."""
-        first, *more = (self._unclear(law, rung) or _AS_LITTLE for rung in range(chosen))
-        passed = [first]
-        for names, why in zip(plainer(law), more, strict=False):
-            if why != first:
-                titles = ", ".join(find_effect(name).words.title for name in names)
-                passed.append(f'of "{titles}": {why}')
-        return "; ".join(passed)
+    def _power(self, rung: int, row: int) -> float:
+        return float(self.data.power(self.at(rung)[1])[0][row])
+
+    def _clearly_less(self, best: int, other: int, row: int) -> bool:
+        """Return whether a rung leaves less than another: by a hundredth of the squares and beyond
+        chance, or by a great part of them and a standard error.
+
+        Beyond chance alone would leave a dip in the waves over the angle that it is added to: they
+        make blocks differ far more than the law does.
+        """
+        less = self._power(best, row) / max(self._power(other, row), 1e-300)
+        if less >= _CONFIG.worth:
+            return False
+        gain = torque_gain_of(self.data, self.at(other)[1], self.at(best)[1])
+        by, high = float(gain.before[row] - gain.after[row]), float(gain.ci95[row][1])
+        return high < 0.0 or (less < _CONFIG.much and 0.5 * (high + by) < by)
 
     def laws_for(self, law: Effect, rung: int) -> list[Effect]:
         """Return the laws of a rung in their fitted shapes."""
         wanted = {(one.name, one.joint) for one in _on(law, rung, self.given.laws)}
-        fitted = self.at(rung).done.model.columns.laws
+        fitted = self.at(rung)[0].model.columns.laws
         return [one for one in fitted if (one.name, one.joint) in wanted]
 
-    def _unclear(self, law: Effect, rung: int) -> str:
-        own, done = self.laws_for(law, rung), self.at(rung).done
+    def unclear(self, law: Effect, rung: int) -> str:
+        """Return why terms of a law are not distinguished; empty where they are."""
+        done, own = self.at(rung)[0], self.laws_for(law, rung)
         laws = enumerate(done.model.columns.laws)
-        words = (unclear(done, place) for place, one in laws if one in own)
-        return next(filter(None, words), "")
+        return next(filter(None, (unclear(done, k) for k, one in laws if one in own)), "")
+
+
+def _left(done: Refined, blocks: int) -> Array:
+    """Return the residual (rows,) [N m] of blocks of time, held out in turn, to first order."""
+    table = done.slopes * done.weights
+    size = np.linalg.norm(table, axis=1)
+    unit = table / np.where(size > 0.0, size, 1.0)[:, None]
+    left, gram, residual = np.empty(unit.shape[1]), unit @ unit.T, done.residual
+    moment, ridge = unit @ residual, 1e-9 * np.eye(len(gram))
+    place = done.data.blocks(blocks)
+    for block in range(int(place.max()) + 1):
+        held = place == block
+        own = unit[:, held]
+        rest = moment - own @ residual[held]
+        left[held] = residual[held] - np.linalg.solve(gram - own @ own.T + ridge, rest) @ own
+    return left / done.weights
 
 
 def _row(law: Effect) -> int:
@@ -183,30 +166,25 @@ def unclear(done: Refined, place: int) -> str:
     √(C_aa + C_bb - 2 C_ab).
     """
     law = done.model.columns.laws[place]
-    names = enumerate(done.names, len(done.model.beta))
-    own = [(k, name) for k, (kind, which, name) in names if kind == 0 and which == place]
+    own = done.numbers_of(0, place)
     if not own or not plainer(law):
         return ""
-    covariance, values = done.covariance(), {name: float(getattr(law, name)) for _, name in own}
-    turning = law.joint is None or done.model.columns.body.robot.revolute[law.joint - 1]
-    units = {q.name: q.unit_at(turning) for q in law.parameters}
-    std = {name: float(np.sqrt(max(covariance[k, k], 0.0))) for k, name in own}
-    known = {name: _known(name, units[name], values[name], std[name]) for name in values}
-    if vague := [known[name] for name in values if not 0.0 < std[name] < _CONFIG.vague]:
+    covariance, turning = done.covariance(), done.model.columns.body.robot.revolute
+    turns = law.joint is None or turning[law.joint - 1]
+    values, words, vague = {}, {}, []
+    for k, name in own:
+        value, std = float(getattr(law, name)), float(np.sqrt(max(covariance[k, k], 0.0)))
+        unit = next(q.unit_at(turns) for q in law.parameters if q.name == name)
+        values[name], words[name] = value, f"{name} = {value:.3g} {unit} (hardly determined)"
+        if 0.0 < std < _CONFIG.rough:
+            words[name] = f"{name} = {value:.3g} ± {std * value:.1g} {unit}"
+        if not 0.0 < std < _CONFIG.vague:
+            vague.append(words[name])
+    if vague:
         return " and ".join(vague)
     for (i, one), (j, other) in pairwise(sorted(own, key=lambda pair: values[pair[1]])):
         variance = covariance[i, i] + covariance[j, j] - 2.0 * covariance[i, j]
         apart = float(np.sqrt(max(variance, 0.0)))
         if np.log(values[other] / values[one]) <= _CONFIG.sure * apart:
-            return f"{known[other]} and {known[one]} may be one"
+            return f"{words[other]} and {words[one]} may be one"
     return ""
-
-
-def _known(name: str, unit: str, value: float, std: float) -> str:
-    """Return a positive number, and how well it is known; `std` of its logarithm."""
-    words = f"{name} = {value:.3g}"
-    if 0.0 < std < _CONFIG.rough:
-        return f"{words} ± {std * value:.1g} {unit}"
-    if 0.0 < std < np.log(_CONFIG.wide):
-        return f"{words} {unit} (known to a factor of {np.exp(std):.2g} only)"
-    return f"{words} {unit} (not determined)"

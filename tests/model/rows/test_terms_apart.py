@@ -149,15 +149,15 @@ def test_merged_terms_are_said() -> None:
     laws = tuple(ThreeSigmoid(j, 124.0, 123.9, 20.0) for j in JOINTS)
     done = fitted(replace(prepared, columns=replace(prepared.columns, laws=laws)))
     for place in range(3):
-        assert re.search(r"w\d = .* s/rad \((not determined|known to a factor of .* only)\)", unclear(done, place))
+        assert re.search(r"w\d = .* s/rad \(hardly determined\)", unclear(done, place))
     plain = fitted(prepare(simple(), SETTINGS))
     assert not any(unclear(plain, place) for place in range(len(plain.model.columns.laws)))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("std", "words"), [
-    ((0.05, 0.6, 0.2), "w1 = 70 ± 4 s/rad and w2 = 60 s/rad (known to a factor of 1.8 only) may be one"),
-    ((1.1, 0.1, 0.1), "w1 = 70 s/rad (known to a factor of 3 only)"), ((400.0, 0.1, 0.1), "w1 = 70 s/rad (not determined)")])
+    ((0.05, 0.6, 0.2), "w1 = 70 ± 4 s/rad and w2 = 60 s/rad (hardly determined) may be one"),
+    ((1.1, 0.1, 0.1), "w1 = 70 s/rad (hardly determined)"), ((400.0, 0.1, 0.1), "w1 = 70 s/rad (hardly determined)")])
 def test_a_sharpness_of_which_only_its_size_is_known_has_no_deviation(std: tuple[float, ...], words: str) -> None:
     """Of a logarithm ± 1.1, three times as much and a third are as likely; ± 400 is nothing known."""
     assert unclear(three_at(70.0, 60.0, 5.0, std), 0) == words
@@ -205,11 +205,6 @@ def test_what_judges_the_model_does_not_choose_it() -> None:
     nothing: Any = object()  # whoever asks it fails
     told = with_terms_told_apart(replace(prepared, judge=nothing), BLOCKS)
     assert told.fewer == with_terms_told_apart(prepared, BLOCKS).fewer != ()
-
-
-def test_the_reason_tells_of_every_law_that_was_passed_over() -> None:
-    told = with_terms_told_apart(prepare(simple(), SETTINGS, synthetic_arm()), BLOCKS)
-    assert any('of "Friction of two sigmoids": ' in one.reason for one in told.fewer)
 
 
 def test_laws_of_one_term_are_left_alone() -> None:
