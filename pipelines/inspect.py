@@ -174,10 +174,6 @@ def _examine(subject: Subject, opened: Opened, settings: Settings) -> list[Check
         of_model += _periods(subject, opened)
     except RrridError as problem:  # a description without usable geometry
         of_model.append(_as_check(problem, opened.path))
-    if any(item.code == "RRID-S13" for item in found):
-        # of two channels with the same samples it is not known that each fits best in its place
-        shown = ("ok", "untested")
-        of_model = [i for i in of_model if i.code != "RRID-S13" or i.level not in shown]
     return [*found, *of_model]
 
 

@@ -11,14 +11,14 @@ import pytest
 from pipelines import estimate_bps
 from pipelines.dynamics.rrr import rigid_body
 from pipelines.estimation.checks import plausibility as plausibility_module
+from pipelines.estimation.checks.boundary import boundary_findings, torque_boundary
 from pipelines.estimation.checks.clock_offset import Offset, clock_offset
 from pipelines.estimation.checks.joint_rows import sample_motion
 from pipelines.estimation.checks.plausibility import Evidence, plausibility, plausibility_findings
 from pipelines.estimation.judgements import excitation
 from pipelines.io.files import Opened, open_log
-from pipelines.io.log import Array, ExperimentLog, Signal
-from pipelines.io.robot import LinkParameters, format_robot
-from pipelines.io.robot_files import load_robot
+from pipelines.io.log import Array, ExperimentLog
+from pipelines.io.robot import LinkParameters
 from pipelines.quality.checks import NotTested, Subject
 from pipelines.stage import Inputs
 from tests.faulty import drifting, healthy_without_reference
@@ -62,7 +62,8 @@ def test_swapped_columns_are_named(seed: int, pair: tuple[int, int], signal: str
     log = healthy_without_reference(good_log(seed))
     order = [0, 1, 2]
     order[pair[0]], order[pair[1]] = pair[1], pair[0]
-    (check,) = plausibility(Subject(with_signal(log, **{signal: log[signal][:, order]})))
+    found = torque_boundary([with_signal(log, **{signal: log[signal][:, order]})])
+    (check,) = boundary_findings(found, "log")
     assert (check.code, check.gate) == ("RRID-S13", True)
     assert check.message.startswith(f"{signal}: columns {pair[0] + 1},{pair[1] + 1} fit swapped")
 
@@ -122,26 +123,6 @@ def test_a_unit_that_every_angle_is_in_is_hinted_at(seed: int, factor: float, hi
     found = [c for c in plausibility(Subject(with_signal(log, q=log.q * factor))) if c.level != "ok"]
     assert [(c.code, c.gate) for c in found] == [("RRID-S15", True)]
     assert f"q fits if every angle is multiplied by {hint}" in found[0].message
-
-
-def test_radians_declared_as_degrees_are_told_from_a_torque_that_is_too_large(shared: Folder) -> None:
-    """Case 47, a UR5: by its torque alone tau of joint 4 would be 60 times too large."""
-    table = np.genfromtxt(shared / "cases" / "47-stale-samples" / "run1.csv", delimiter=",", names=True)
-    q, tau = (np.stack([table[f"{name}_{j}"] for j in range(1, 7)], axis=1) for name in ("q", "tau"))
-    robot = load_robot(shared / "cases" / "47-stale-samples" / "arm.urdf")
-    signals = {"t": Signal(table["t"], "s", "time"), "q": Signal(np.radians(q), "rad", "position"),
-               "tau": Signal(tau, "N m", "torque")}
-    log = ExperimentLog("run1", "excitation", "identify", "measured", robot.name, 0.004, format_robot(robot), signals,
-                        torque="measured")
-    (check,) = [c for c in plausibility(Subject(log)) if c.gate]
-    assert (check.code, check.where.rpartition(" ")[2]) == ("RRID-S15", "q")
-    assert check.message.startswith("the unit of q looks wrong: as declared, tau of joint ")
-    assert "every angle multiplied by 180/pi" in check.message
-    right = with_signal(log, q=q)
-    assert [c for c in plausibility(Subject(right)) if c.gate] == []
-    for factors in (np.array([1, 1, 1, 60, 1, 1]), np.full(6, 57.3)):
-        found = [c for c in plausibility(Subject(with_signal(right, tau=tau * factors))) if c.gate]
-        assert any(c.message.startswith("tau of joint 4 is 5") for c in found)
 
 
 @pytest.mark.parametrize("every", [2, 3])
@@ -295,16 +276,6 @@ def test_logs_that_do_not_move_the_arm_are_not_judged(experiment: str) -> None:
 def test_the_fit_of_the_good_log_is_close() -> None:
     """With the right columns 1 % of the torque at most is left: the smoothing costs little."""
     assert (evidence(good_log()).residual < 0.01).all()
-
-
-def test_a_torque_that_nothing_explains_is_not_in_order() -> None:
-    """The second column is noise of the torque's size; the others fit within 1 %."""
-    log = good_log()
-    tau = log.tau.copy()
-    tau[:, 1] = np.convolve(np.random.default_rng(0).standard_normal(len(tau)), np.ones(40) / 6.0, mode="same") * tau[:, 1].std()
-    found = [c for c in plausibility(Subject(with_signal(log, tau=tau))) if c.code == "RRID-S13"]
-    assert [c.level for c in found] == ["warn"]
-    assert "joint 2's torque is not explained by its motion" in found[0].message
 
 
 def test_links_that_explain_nothing_judge_nothing() -> None:

@@ -10,6 +10,7 @@ import pytest
 from bench import experiments
 from bench.draw import draw_machine
 from bench.plant import record
+from pipelines.estimation.checks.boundary import boundary_findings, torque_boundary
 from pipelines.estimation.checks.plausibility import plausibility
 from pipelines.io.log import ExperimentLog
 from pipelines.quality.checks import Subject
@@ -51,8 +52,8 @@ def test_sweeps_are_plausible(seed: int) -> None:
 def test_swapped_torques_of_sweeps_are_named(seed: int, pair: tuple[int, int]) -> None:
     log, order = sweeping(seed), [0, 1, 2]
     order[pair[0]], order[pair[1]] = pair[1], pair[0]
-    (found,) = alarms(with_signal(log, tau=log.tau[:, order]))
-    assert found.startswith(f"RRID-S13 tau: columns {pair[0] + 1},{pair[1] + 1} fit swapped")
+    (found,) = boundary_findings(torque_boundary([with_signal(log, tau=log.tau[:, order])]), "log")
+    assert found.message.startswith(f"tau: columns {pair[0] + 1},{pair[1] + 1} fit swapped")
 
 
 @pytest.mark.parametrize("joint", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)])

@@ -23,19 +23,15 @@ from pipelines.estimation.checks.gravity_fit import GravityFit, GravityModel
 from pipelines.estimation.checks.joint_rows import Sampled, sample_motion
 from pipelines.estimation.checks.torque_rows import Array, GenericArm, generic_arm, torque_rows
 from pipelines.io.log import ExperimentLog
-from pipelines.io.robot import RobotDescription
 from pipelines.quality.segments import Usable
 from pipelines.quality.subject import Subject
-
-__all__ = ["Boundary", "Direction", "JointOrder", "NotIdentifiable", "Share"]
-__all__ += ["boundary_findings", "torque_boundary", "without_followers"]
 
 _STANDARD_GRAVITY = 9.80665  # numerics: [m/s^2]
 _MOVING = ("excitation", "free", "writing")
 _AXES = np.concatenate([np.eye(3), -np.eye(3)])
 _SHORT = 8  # numerics: samples: a shorter run tells neither noise nor motion
 # other codes that a boundary finding brings about, on the same logs: they are left out
-_FOLLOWERS = ("RRID-S13", "RRID-S14", "RRID-S15", "RRID-D09", "RRID-D05")
+_FOLLOWERS = ("RRID-S14", "RRID-S15", "RRID-D09", "RRID-D05")
 
 
 @dataclass(frozen=True)
@@ -131,26 +127,19 @@ def torque_boundary(
         return None
     robot, names = usable[0].log.robot, tuple(one.log.name for one in usable)
     sign, evidence = _sign(usable, config)
-    if sign == "magnitude":
-        return _unread(robot, sign, names, "not identifiable from magnitudes", evidence)
-    try:
-        arm = generic_arm(robot)
-        motions = [m for one in usable if (m := sample_motion(one)) and len(m.t) > 1]
-        if sum(len(motion.t) for motion in motions) < 4 * (len(arm.columns) + 6):
-            return None
-        return _Estimate(robot, arm, motions, config).boundary(names, sign, evidence)
-    except (ArithmeticError, np.linalg.LinAlgError, ValueError) as error:
-        reason = f"not identifiable: the fit failed: {error}"
-        return _unread(robot, sign, names, reason, evidence)
-
-
-def _unread(
-    robot: RobotDescription, sign: str | None, names: tuple[str, ...], why: str, evidence: str
-) -> Boundary:
-    """Return a boundary of which nothing but the sign is known."""
-    nothing = Share(None, None, reason=why)
-    direction = Direction(None, None, robot.gravity, None, reason=why)
-    order = JointOrder(None, "", reason=why)
+    reason = "not identifiable from magnitudes"
+    if sign != "magnitude":
+        try:
+            arm = generic_arm(robot)
+            motions = [m for one in usable if (m := sample_motion(one)) and len(m.t) > 1]
+            if sum(len(motion.t) for motion in motions) < 4 * (len(arm.columns) + 6):
+                return None
+            estimate = _Estimate(np.array(robot.gravity), arm, motions, config)
+            return estimate.boundary(names, sign, evidence)
+        except (ArithmeticError, np.linalg.LinAlgError, ValueError) as error:
+            reason = f"not identifiable: the fit failed: {error}"
+    nothing, order = Share(None, None, reason=reason), JointOrder(None, "", reason=reason)
+    direction = Direction(None, None, robot.gravity, None, reason=reason)
     return Boundary(None, sign, nothing, nothing, direction, order, (evidence,), names)
 
 
@@ -161,12 +150,10 @@ def _sign(logs: Sequence[Usable], config: BoundaryConfig) -> tuple[str | None, s
     never crosses it is a magnitude: of a smooth signal, zero is crossed where it is reached, except
     by chance.
     """
-    touches = [
-        touches_of_zero(
-            [(one.log.tau[r, j], one.log.q[r, j]) for one in logs for r in one.runs], config
-        )
-        for j in range(logs[0].log.n_joints)
-    ]
+    touches = []
+    for j in range(logs[0].log.n_joints):
+        parts = [(one.log.tau[run, j], one.log.q[run, j]) for one in logs for run in one.runs]
+        touches.append(touches_of_zero(parts, config))
     counts = [count for count in touches if count is not None]
     if len(counts) < len(touches):
         signed = ", ".join(str(j) for j, count in enumerate(touches, 1) if count is None)
@@ -223,18 +210,14 @@ class _Fits:
     turned: tuple[GravityFit, ...]  # vectors of 9.8 m/s^2, the best of each region first
 
 
+@dataclass(frozen=True, eq=False)
 class _Estimate:
     """The torque boundary of one robot's logs."""
 
-    def __init__(
-        self,
-        robot: RobotDescription,
-        arm: GenericArm,
-        motions: Sequence[Sampled],
-        config: BoundaryConfig,
-    ) -> None:
-        self.arm, self.motions, self.config = arm, motions, config
-        self.described = np.array(robot.gravity)
+    described: Array  # (3,) gravity
+    arm: GenericArm
+    motions: Sequence[Sampled]
+    config: BoundaryConfig
 
     def boundary(self, names: tuple[str, ...], sign: str | None, evidence: str) -> Boundary:
         order, fits = self.ordered(self.fits())
@@ -245,10 +228,10 @@ class _Estimate:
         sides = {True: None if little else "motor", False: "joint", None: None}
         if order.signal:
             removed = turned = False  # the order first: it is what the rest rests on
-        left = f"the model leaves {_percent(fits.described)} of a joint's torque with gravity as "
-        left += f"described, {_percent(fits.none)} without gravity, {_percent(fits.best)} with the "
-        left += "gravity vector that fits best"
-        parts = (gravity, friction, direction, order, (evidence, left))
+        percent = [f"{100.0 * fit.rms:.2g} %" for fit in (fits.described, fits.none, fits.best)]
+        told = f"the model leaves {percent[0]} of a joint's torque with gravity as described, "
+        told += f"{percent[1]} without gravity, {percent[2]} with the gravity vector that fits best"
+        parts = (gravity, friction, direction, order, (evidence, told))
         return Boundary(sides[friction.present], sign, *parts, names, removed, turned)
 
     def fits(self, order: ColumnOrder | None = None) -> _Fits:
@@ -261,7 +244,7 @@ class _Estimate:
         first = max(map(model.fit, (np.zeros(3), *starts)), key=lambda fit: fit.score)
         model.count_independent(model.search(first.gravity))
         turned: list[GravityFit] = []
-        tried = [model.search_direction(start, _STANDARD_GRAVITY) for start in starts]
+        tried = [model.search(start, _STANDARD_GRAVITY) for start in starts]
         for fit in sorted(tried, key=lambda fit: -fit.score):
             apart = (_angle(fit.gravity, other.gravity) for other in turned)
             if all(angle > self.config.tilt for angle in apart):
@@ -273,44 +256,41 @@ class _Estimate:
 
     def ordered(self, fits: _Fits) -> tuple[JointOrder, _Fits]:
         """Return the order of the columns, and the fits under it."""
-        config, rows = self.config, fits.model.rows
-        n = rows.n_joints
+        config, rows, best = self.config, fits.model.rows, fits.best
+        n = len(rows.tau)
         same = JointOrder(tuple(range(1, n + 1)), "")
-        mistaken = fits.best.score > fits.described.score + config.decisive
         travel = np.ptp(np.concatenate([motion.q for motion in self.motions]), axis=0)
         moving = np.flatnonzero(travel > config.held * travel.max()).tolist()
-        motion, best = self.motions[0], fits.best
-        tried = search_orders(self.arm, motion, self.described, moving, best, config)
+        tried = search_orders(self.arm, self.motions[0], self.described, moving, best, config)
         if not tried:
             return same, fits
         # all orders by one number of independent moments, that of the order that leaves the least
         variances, moments = map(np.stack, zip(*map(self.by_column, tried), strict=True))
-        gains = np.log(fits.best.variance / variances)
+        gains = np.log(best.variance / variances)
         likelihoods = 0.5 * gains @ moments[np.argmin(np.log(variances).sum(axis=1))]
         top = int(np.argmax(likelihoods))
         least = np.minimum(fits.model.effective, moments[top])
         # moments that the parameters take up are no evidence
         free = 1.0 - (rows.inertial.shape[2] + n * rows.own.shape[2]) / float(least.sum())
         gain = 0.5 * max(free, 0.0) * float(gains[top] @ least)
-        if gain < -(config.decisive if mistaken else config.alike):
+        mistaken = best.score > fits.described.score + config.decisive
+        if gain < (config.decisive if mistaken else -config.alike):
             return same, fits
         chosen, other = tried[top], self.fits(tried[top])
-        before, after = fits.best.rms, other.best.rms
-        if gain > config.decisive and other.best.power < config.explained * fits.best.power:
+        same = replace(same, before=best.rms, after=other.best.rms)
+        if gain > config.decisive and other.best.power < config.explained * best.power:
             near = np.flatnonzero(likelihoods > likelihoods[top] - config.alike)
-            order = JointOrder(tuple(k + 1 for k in chosen.order), chosen.signal, before, after)
+            columns = tuple(k + 1 for k in chosen.order)
+            order = replace(same, columns=columns, signal=chosen.signal)
             if len(near) > 1:
-                orders = "; ".join(f"{tried[k].signal} {_listed(tried[k])}" for k in near)
+                orders = "; ".join(f"{tried[k].signal} {tried[k].listed}" for k in near)
                 order = replace(order, columns=None, reason=f"several orders fit alike: {orders}")
             return order, other
-        swapped = f"{chosen.signal} are in the order {_listed(chosen)}"
-        if not mistaken:
-            reason = f"not identifiable: the torque is explained as well if {swapped}"
-            return replace(same, before=before, after=after, reason=reason), fits
-        if other.described.power < config.explained * fits.described.power:
-            reason = f"either gravity is not as described, or {swapped}: both explain the torque"
-            return JointOrder(None, chosen.signal, fits.described.rms, after, reason), fits
-        return replace(same, before=before, after=after), fits
+        if mistaken:
+            return same, fits
+        reason = "not identifiable: the torque is explained as well if "
+        reason += f"{chosen.signal} are in the order {chosen.listed}"
+        return replace(same, reason=reason), fits
 
     def by_column(self, order: ColumnOrder) -> tuple[Array, Array]:
         """Return the relative residual variance and the number of independent moments (n,) of each
@@ -347,18 +327,12 @@ class _Estimate:
             found = Share(None, None, present=present, reason=reason)
         told = tuple(described.tolist())
         if present is False:
-            removed = (
-                bool(np.any(described)) and none.score > fits.described.score + config.decisive
-            )
+            lacks = none.score > fits.described.score + config.decisive
             nowhere = Direction(None, None, told, None, (), "the torque holds no gravity")
-            return found, nowhere, removed, False
-        angle = _angle(top.gravity, described)
-        turned = (
-            top.power < config.explained * fits.described.power
-            and angle > config.tilt
-            and top.score > self.tilted(fits) + config.decisive
-        )
-        pointing = tuple(map(float, top.gravity))
+            return found, nowhere, bool(np.any(described)) and lacks, False
+        angle, pointing = _angle(top.gravity, described), tuple(map(float, top.gravity))
+        turned = top.power < config.explained * fits.described.power and angle > config.tilt
+        turned = turned and top.score > self.tilted(fits) + config.decisive
         sideways = np.linalg.svd(along[None])[2][1:]
         spread = float(np.linalg.eigvalsh(sideways @ covariance @ sideways.T)[-1])
         spread = float(np.arctan(np.sqrt(max(spread, 0.0)) / _STANDARD_GRAVITY))
@@ -366,8 +340,7 @@ class _Estimate:
         if any(fit.score > top.score - config.alike for fit in fits.turned[1:]):
             reason = "not identifiable: gravity in another direction explains the torque as well"
         elif spread > config.direction_std:
-            degrees = np.degrees(2.0 * spread)
-            reason = f"not identifiable to better than {degrees:.0f} degrees"
+            reason = f"not identifiable to better than {np.degrees(2.0 * spread):.0f} degrees"
         if reason:
             return found, Direction(None, None, told, None, pointing, reason), False, turned
         return found, Direction(pointing, spread, told, angle, pointing), False, turned
@@ -392,39 +365,38 @@ class _Estimate:
 
         s_j = <τ_f v> / (rms τ · rms v)        linear, signed, for any friction law
         """
-        config = self.config
-        n, c = own.shape
-        weights = np.zeros((n, n * c))
-        for j in range(n):
-            weights[j, j * c : (j + 1) * c] = dissipated[j]
+        config, (n, c) = self.config, own.shape
+        weights = (np.eye(n)[:, :, None] * dissipated).reshape(n, n * c)
         moves = np.any(dissipated != 0.0, axis=1)  # a joint that is held has none to tell
         each = weights @ own.ravel()
         std = np.sqrt(np.maximum(np.einsum("jk,kl,jl->j", weights, covariance, weights), 0.0))
         # by the balance of energy a cycle dissipates no more than the torque's power
         told = moves & (std < config.undetermined) & (np.abs(each - 0.5) < 0.5 + 2.0 * std)
+        unknown = "not identifiable: the motion does not tell friction from none"
         if not told.any():
-            reason = "not identifiable: the motion does not tell friction from none"
-            return Share(None, None, reason=reason)
+            return Share(None, None, reason=unknown)
         absent, floor = config.friction_absent, 0.1 * config.friction_absent
         sure = told / (std**2 + floor**2)  # a joint whose friction no motion tells has no say
         mean = sure @ weights / float(sure.sum())
         share = float(mean @ own.ravel())
         deviation = float(np.sqrt(max(mean @ covariance @ mean, 0.0)))
         upper = share + 2.0 * deviation
-        read = told & (std < absent)
-        present: bool | None = None
-        reason = "not identifiable: the motion does not tell friction from none"
+        read, present = told & (std < absent), None
         some = bool((each - 3.0 * std > absent)[told].any())
+        reason = unknown
         if some or share > 3.0 * np.hypot(deviation, floor):
             present, reason = True, ""
-            if upper < absent:
-                reason = "so little that it may be a direct drive, or what compensation leaves"
-        elif 3.0 * deviation < share < absent:
-            reason = "so little that it may be what compensation leaves"
-        elif read.any() and upper < absent and (each + 2.0 * std < 2.0 * absent)[read].all():
+        elif (
+            read.any()
+            and upper < absent
+            and share <= 3.0 * deviation
+            and (each + 2.0 * std < 2.0 * absent)[read].all()
+        ):
             present = False
-            reason = "compensated friction and a torque measured beyond the gear are one answer "
-            reason += "here: they differ by the rotor inertia alone"
+            reason = "compensated friction and a torque measured beyond the gear are one "
+            reason += "answer here: they differ by the rotor inertia alone"
+        if 3.0 * deviation < share < upper < absent and present is not False:
+            reason = "so little that it may be a direct drive, or what compensation leaves"
         return Share(share, deviation, present, upper, reason)
 
 
@@ -452,14 +424,6 @@ def _angle(one: Array, other: Array) -> float:
     return float(np.arccos(np.clip(one @ other / size, -1.0, 1.0))) if size > 0.0 else 0.5 * np.pi
 
 
-def _listed(order: ColumnOrder) -> str:
-    return ",".join(str(k + 1) for k in order.order)
-
-
-def _percent(fit: GravityFit) -> str:
-    return f"{100.0 * fit.rms:.2g} %"
-
-
 def boundary_findings(boundary: Boundary | None, where: str) -> tuple[Check, ...]:
     """Return the gate that `boundary` closes: S13, S23, S24 or S25.
 
@@ -473,14 +437,13 @@ def boundary_findings(boundary: Boundary | None, where: str) -> tuple[Check, ...
         code, words = "S25", f"tau has no sign: {boundary.evidence[0]}"
         remedy = "log the signed torque or current; magnitudes fit no model of the arm"
     elif order.signal:
-        code, where = "S13", f"{where}, signal {order.signal}"
-        words = f"{order.signal}: {order.reason}"
+        code, where, words = "S13", f"{where}, signal {order.signal}", order.reason
         if order.columns is not None:
             moved = [k for k, column in enumerate(order.columns, 1) if column != k]
             how = f"in the order {','.join(str(order.columns[k - 1]) for k in moved)}"
             how = "swapped" if len(moved) == 2 else how
-            words = f"{order.signal}: columns {','.join(map(str, moved))} fit {how}"
-        words += f", residual {order.before:.2f} -> {order.after:.2f}"
+            words = f"columns {','.join(map(str, moved))} fit {how}"
+        words = f"{order.signal}: {words}, residual {order.before:.2f} -> {order.after:.2f}"
         remedy = "put the columns in the order of the robot's joints: correct the column map of "
         remedy += "the import"
     elif boundary.without_gravity:

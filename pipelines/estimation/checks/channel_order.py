@@ -7,7 +7,7 @@ either alone from a column map.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -18,8 +18,6 @@ from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.estimation.checks.gravity_fit import GravityFit
 from pipelines.estimation.checks.joint_rows import Sampled
 from pipelines.estimation.checks.torque_rows import Array, GenericArm, RowFilter, own_columns
-
-__all__ = ["ColumnOrder", "search_orders"]
 
 Order = tuple[int, ...]
 _SIGNALS = ("q and tau", "tau", "q")
@@ -45,6 +43,10 @@ class ColumnOrder:
         """The order of the torques."""
         return self.order if "tau" in self.signal else tuple(range(len(self.order)))
 
+    @property
+    def listed(self) -> str:
+        return ",".join(str(k + 1) for k in self.order)
+
 
 def search_orders(
     arm: GenericArm,
@@ -64,16 +66,14 @@ def search_orders(
         logged: the best fit of the columns as they are.
     """
     explained = logged.residual.max() < config.suspect
-    signals = _SIGNALS[:1] if explained else _SIGNALS
     # go on where no exchange fits better than the log
     every = logged.rms > config.lost or (len(moving) <= config.few and not explained)
     least = -0.5 * float(np.sum(np.log(logged.variance))) - len(logged.variance)  # hopeless below
-    thinned = motion.every(max(1, len(motion.t) // config.order_rows))
-    scorer = _Scorer(arm, thinned, gravity, config.model_error)
+    score = _scorer(arm, motion.every(max(1, len(motion.t) // config.order_rows)), gravity, config)
     same: Order = tuple(range(len(arm.chain.revolute)))
     scores: dict[ColumnOrder, float] = {}
-    for signal in signals:
-        own = {same: scorer(ColumnOrder(signal, same))}
+    for signal in _SIGNALS[:1] if explained else _SIGNALS:
+        own = {same: score(ColumnOrder(signal, same))}
         beam: list[Order] = []
         for _ in range(len(moving) - 1):
             best = sorted(own, key=lambda order: -own[order])[:_BEAM]
@@ -81,68 +81,64 @@ def search_orders(
                 break
             beam = best
             near = {_exchanged(order, a, b) for order in beam for a, b in combinations(moving, 2)}
-            own |= {order: scorer(ColumnOrder(signal, order)) for order in near - own.keys()}
+            own |= {order: score(ColumnOrder(signal, order)) for order in near - own.keys()}
         scores |= {ColumnOrder(signal, order): x for order, x in own.items() if order != same}
     ranked = sorted(scores.items(), key=lambda item: -item[1])[: config.orders]
-    return tuple(order for order, score in ranked if score > least)
-
-
-class _Scorer:
-    """Log likelihoods a moment of orders."""
-
-    def __init__(
-        self, arm: GenericArm, motion: Sampled, gravity: Array, model_error: float
-    ) -> None:
-        self.columns, self.chain = arm.columns, replace(arm.chain, gravity=gravity)
-        self.motion, self.model_error = motion, model_error
-        self.filter = RowFilter([motion])
-        own = self.filter(own_columns(motion.dq, motion.ddq, motion.coulomb))
-        torque = self.filter(motion.tau.T[:, :, None])[:, :, 0].T
-        self.size = np.maximum(np.std(torque, axis=0), 1e-12)
-        lengths = np.maximum(np.linalg.norm(own, axis=1, keepdims=True), 1e-300)
-        self.basis = np.linalg.qr(own / lengths)[0]  # of each column of the positions
-        # torque (n, N, n) less what each column's own explains
-        self.tau = torque - self.basis @ (self.basis.transpose(0, 2, 1) @ torque)
-        self.rows: dict[Order, tuple[Array, Array]] = {}
-
-    def _rows(self, order: Order) -> tuple[Array, Array]:
-        """Return Gram matrices (n, p, p) and products with every torque (n, p, n) of positions."""
-        if order not in self.rows:
-            at, m = list(order), self.motion
-            y = regressor(self.chain, m.q[:, at], m.dq[:, at], m.ddq[:, at], self.columns)
-            own, basis = self.filter(y.transpose(1, 0, 2)), self.basis[at]
-            own = own - basis @ (basis.transpose(0, 2, 1) @ own)
-            turned = own.transpose(0, 2, 1)
-            self.rows[order] = turned @ own / own.shape[1], turned @ self.tau[at] / own.shape[1]
-        return self.rows[order]
-
-    def __call__(self, one: ColumnOrder) -> float:
-        """Return the log likelihood a moment of an order."""
-        gram, cross = self._rows(one.q)
-        joints, torques = np.arange(len(one.order)), list(one.tau)
-        size = self.size[torques]
-        total = np.mean(self.tau[list(one.q), :, torques] ** 2, axis=1) / size**2
-        gram, right = (
-            gram / size[:, None, None] ** 2,
-            cross[joints, :, torques] / size[:, None] ** 2,
-        )
-        scale = np.sqrt(np.maximum(np.einsum("jpp->p", gram), 1e-300))
-        scale[scale < 1e-10 * scale.max()] = np.inf
-        gram, right = gram / np.outer(scale, scale), right / scale
-        count = gram.shape[1]
-        ridge = 1e-6 * np.eye(count) * np.einsum("jpp->j", gram)[:, None, None] / count
-        alone = np.linalg.solve(gram + ridge, right[:, :, None])[:, :, 0]  # each joint by itself
-        variance = np.maximum(total - np.sum(right * alone, axis=1), 0.0) + self.model_error**2
-        for _ in range(_ROUNDS):
-            normal = np.tensordot(1.0 / variance, gram, 1)
-            normal += _RIDGE * np.trace(normal) / count * np.eye(count)
-            phi = np.linalg.solve(normal, right.T @ (1.0 / variance))
-            rest = total - 2.0 * right @ phi + gram @ phi @ phi
-            variance = np.maximum(rest, 0.0) + self.model_error**2
-        return -0.5 * float(np.sum(np.log(variance)))
+    return tuple(order for order, x in ranked if x > least)
 
 
 def _exchanged(order: Order, a: int, b: int) -> Order:
     swapped = list(order)
     swapped[a], swapped[b] = order[b], order[a]
     return tuple(swapped)
+
+
+def _scorer(
+    arm: GenericArm, motion: Sampled, gravity: Array, config: BoundaryConfig
+) -> Callable[[ColumnOrder], float]:
+    """Return the log likelihood a moment of an order."""
+    chain, smooth = replace(arm.chain, gravity=gravity), RowFilter([motion])
+    error = config.model_error**2
+    own = smooth(own_columns(motion.dq, motion.ddq, motion.coulomb))
+    torque = smooth(motion.tau.T[:, :, None])[:, :, 0].T
+    sizes = np.maximum(np.std(torque, axis=0), 1e-12)
+    own /= np.maximum(np.linalg.norm(own, axis=1, keepdims=True), 1e-300)
+    basis = np.linalg.qr(own)[0]  # of each column of the positions
+    # torque (n, N, n) less what each column's own explains
+    tau = torque - basis @ (basis.transpose(0, 2, 1) @ torque)
+    rows: dict[Order, tuple[Array, Array]] = {}
+
+    def rows_of(order: Order) -> tuple[Array, Array]:
+        """Return Gram matrices (n, p, p) and products with every torque (n, p, n) of positions."""
+        if order not in rows:
+            at = list(order)
+            y = regressor(chain, motion.q[:, at], motion.dq[:, at], motion.ddq[:, at], arm.columns)
+            columns = smooth(y.transpose(1, 0, 2))
+            columns = columns - basis[at] @ (basis[at].transpose(0, 2, 1) @ columns)
+            turned = columns.transpose(0, 2, 1) / columns.shape[1]
+            rows[order] = turned @ columns, turned @ tau[at]
+        return rows[order]
+
+    def score(one: ColumnOrder) -> float:
+        gram, cross = rows_of(one.q)
+        joints, torques = np.arange(len(one.order)), list(one.tau)
+        size = sizes[torques]
+        total = np.mean(tau[list(one.q), :, torques] ** 2, axis=1) / size**2
+        gram = gram / size[:, None, None] ** 2
+        right = cross[joints, :, torques] / size[:, None] ** 2
+        scale = np.sqrt(np.maximum(np.einsum("jpp->p", gram), 1e-300))
+        scale[scale < 1e-10 * scale.max()] = np.inf
+        gram, right = gram / np.outer(scale, scale), right / scale
+        count = gram.shape[1]
+        ridge = 1e-6 * np.eye(count) * np.einsum("jpp->j", gram)[:, None, None] / count
+        alone = np.linalg.solve(gram + ridge, right[:, :, None])[:, :, 0]  # each joint by itself
+        variance = np.maximum(total - np.sum(right * alone, axis=1), 0.0) + error
+        for _ in range(_ROUNDS):
+            normal = np.tensordot(1.0 / variance, gram, 1)
+            normal += _RIDGE * np.trace(normal) / count * np.eye(count)
+            phi = np.linalg.solve(normal, right.T @ (1.0 / variance))
+            rest = total - 2.0 * right @ phi + gram @ phi @ phi
+            variance = np.maximum(rest, 0.0) + error
+        return -0.5 * float(np.sum(np.log(variance)))
+
+    return score

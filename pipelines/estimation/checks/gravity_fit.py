@@ -13,23 +13,20 @@ McCaffrey 2002):
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from pipelines.estimation.checks.config import BoundaryConfig
-from pipelines.estimation.checks.torque_rows import CLUSTERS, Array, TorqueRows
-
-__all__ = ["GravityFit", "GravityModel"]
+from pipelines.estimation.checks.torque_rows import Array, TorqueRows
 
 _RIDGE = 1e-9  # numerics: of equilibrated columns
 _STEPS = 30  # numerics
 _ENOUGH = 1e-4  # numerics: gain in log likelihood a step, below which the fit has ended
 _ROUNDS = 12  # numerics: of reweighting at most
 _SETTLED = 3e-3  # numerics: change of a log variance, at which reweighting ends
-_LOOSE = BoundaryConfig.loose  # [m/s^2]
+_CONFIG = BoundaryConfig()
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,25 +70,22 @@ class GravityModel:
         scale = np.sqrt(scale)
         # infinite: a parameter without any effect
         self.scale = np.where(scale > 1e-10 * scale.max(initial=1e-300), scale, np.inf)
-        self.alone = self._alone()
-
-    def _alone(self) -> Array:
-        """Return the variance (n,) of each joint fitted by itself under any gravity: the least that
-        a fit of all can leave, from which its weights begin.
-        """
-        scale = np.sqrt(np.maximum(np.einsum("jpp->jp", self.gram), 1e-300))[:, :-1]
-        columns = self.gram[:, :-1, :-1] / (scale[:, :, None] * scale[:, None, :])
-        right = self.gram[:, :-1, -1] / scale
-        solved = np.linalg.solve(columns + 1e-6 * np.eye(len(scale[0])), right[:, :, None])
-        left = self.gram[:, -1, -1] - np.sum(right * solved[:, :, 0], axis=1)
-        return np.asarray(np.maximum(left, 0.0) + self.model_error**2)
+        # variance (n,) of each joint fitted by itself under any gravity: the least that a fit of
+        # all can leave, from which its weights begin
+        unit = np.sqrt(np.maximum(np.einsum("jpp->jp", self.gram), 1e-300))[:, :-1]
+        columns = self.gram[:, :-1, :-1] / (unit[:, :, None] * unit[:, None, :])
+        right = self.gram[:, :-1, -1] / unit
+        solved = np.linalg.solve(columns + 1e-6 * np.eye(len(unit[0])), right[:, :, None])
+        alone = self.gram[:, -1, -1] - np.sum(right * solved[:, :, 0], axis=1)
+        self.alone = np.maximum(alone, 0.0) + model_error**2
 
     def _transform(self, gravity: Array) -> Array:
         """T (P, p) of one gravity (3,): columns of the model = [Y_0 Y_x Y_y Y_z] T."""
-        p, heavy = self.rows.inertial.shape[2], self.rows.heavy
         first = np.diag(1.0 / self.scale)
-        pulled = [a * first[heavy] for a in gravity]
-        return np.concatenate([first, *pulled]).reshape(p + 3 * len(heavy), p)
+        return np.concatenate([first, *(a * first[self.rows.heavy] for a in gravity)])
+
+    def _scaled(self, fit: GravityFit) -> Array:
+        return fit.parameters * np.where(np.isfinite(self.scale), self.scale, 0.0)
 
     def fit(self, gravity: Array, variance: Array | None = None) -> GravityFit:
         """Fit the parameters under `gravity` (3,), from the `variance` (n,) of a fit nearby."""
@@ -107,7 +101,7 @@ class GravityModel:
             if np.abs(np.log(variance / before)).max() < _SETTLED:
                 break
         score = -0.5 * float(self.effective @ np.log(variance))
-        score -= 0.5 * float(gravity @ gravity) / _LOOSE**2
+        score -= 0.5 * float(gravity @ gravity) / _CONFIG.loose**2
         residual = np.sqrt(np.maximum(left, 0.0))
         return GravityFit(gravity, phi / self.scale, variance, residual, score)
 
@@ -119,51 +113,40 @@ class GravityModel:
             along: (k, 3) directions in which the gravity is changed.
         """
         p, heavy = self.rows.inertial.shape[2], self.rows.heavy
-        theta = fit.parameters * np.where(np.isfinite(self.scale), self.scale, 0.0)
         change = np.zeros((p + 3 * len(heavy), len(along)))
         change[p:] = np.einsum("gk,m->kmg", along, fit.parameters[heavy]).reshape(-1, len(along))
         gram = np.tensordot(self.effective / fit.variance, self.gram, 1)
         turn = self._transform(fit.gravity)
         onto_turn, onto_change = gram[:-1, :-1] @ turn, gram[:-1, :-1] @ change
         normal, cross = turn.T @ onto_turn, turn.T @ onto_change
-        left = gram[:-1, -1] - onto_turn @ theta
+        left = gram[:-1, -1] - onto_turn @ self._scaled(fit)
         # turnᵀ left is zero but for the reweighting that has not ended
         inward = np.linalg.solve(normal + _ridge(normal), np.column_stack([cross, turn.T @ left]))
-        slope = change.T @ left - cross.T @ inward[:, -1] - along @ fit.gravity / _LOOSE**2
-        hessian = change.T @ onto_change - cross.T @ inward[:, :-1] + along @ along.T / _LOOSE**2
-        return slope, hessian
+        loose = _CONFIG.loose**2
+        slope = change.T @ left - cross.T @ inward[:, -1] - along @ fit.gravity / loose
+        return slope, change.T @ onto_change - cross.T @ inward[:, :-1] + along @ along.T / loose
 
-    def search(self, start: Array) -> GravityFit:
-        """Fit the gravity as well, from `start` (3,)."""
-        axes = np.eye(3)
-        return self._climb(start, lambda _: axes, lambda fit, step, _: fit.gravity + step)
+    def search(self, start: Array, size: float | None = None) -> GravityFit:
+        """Fit the gravity as well, from `start` (3,), by Levenberg-Marquardt steps.
 
-    def search_direction(self, start: Array, size: float) -> GravityFit:
-        """Fit the direction of gravity of `size` [m/s^2], from `start` (3,)."""
-
-        def across(fit: GravityFit) -> Array:
-            return np.asarray(size * np.linalg.svd(fit.gravity[None])[2][1:])
-
-        def stepped(fit: GravityFit, step: Array, along: Array) -> Array:
-            turned = fit.gravity + np.clip(step, -0.5, 0.5) @ along
-            return np.asarray(size * turned / np.linalg.norm(turned))
-
-        return self._climb(size * start / np.linalg.norm(start), across, stepped)
-
-    def _climb(
-        self,
-        start: Array,
-        along_at: Callable[[GravityFit], Array],
-        stepped: Callable[[GravityFit, Array, Array], Array],
-    ) -> GravityFit:
-        """Climb the log likelihood by Levenberg-Marquardt steps."""
-        best, damping = self.fit(start), 1e-3
+        Args:
+            size: [m/s^2] of gravity, where only its direction is searched.
+        """
+        best = self.fit(start if size is None else size * start / np.linalg.norm(start))
+        damping = 1e-3
         for _ in range(_STEPS):
-            along = along_at(best)
+            along = np.eye(3)
+            if size is not None:
+                along = size * np.linalg.svd(best.gravity[None])[2][1:]
             slope, hessian = self.curvature(best, along)
             diagonal = np.diag(np.diag(hessian) + 1e-12 * np.trace(hessian) + 1e-300)
-            step = np.asarray(np.linalg.solve(hessian + damping * diagonal, slope))
-            tried = self.fit(stepped(best, step, along), best.variance)
+            step = np.linalg.solve(hessian + damping * diagonal, slope)
+            if size is None:
+                moved = best.gravity + step
+            else:
+                moved = best.gravity + np.clip(step, -0.5, 0.5) @ along
+                moved = size * moved / np.linalg.norm(moved)
+            tried = self.fit(moved, best.variance)
             if tried.score > best.score:
                 gained, best, damping = tried.score - best.score, tried, 0.1 * damping
                 if gained < _ENOUGH:
@@ -180,8 +163,7 @@ class GravityModel:
         ν = N / (1 + 2 Σ ρ_k), summed over the initial positive pairs of the autocorrelation (Geyer
         1992).
         """
-        theta = fit.parameters * np.where(np.isfinite(self.scale), self.scale, 0.0)
-        model = self._transform(fit.gravity) @ theta
+        model = self._transform(fit.gravity) @ self._scaled(fit)
         residuals = self.projected[:, :, -1] - self.projected[:, :, :-1] @ model
         n, total = residuals.shape
         edges = list(pairwise([*self.rows.start.tolist(), total]))
@@ -203,13 +185,12 @@ class GravityModel:
             covariance (3, 3) of the gravity; own coefficients (n, c) and their covariance
             (n c, n c).
         """
-        rows, heavy = self.rows, self.rows.heavy
-        n, moments, p = rows.inertial.shape
-        c = rows.own.shape[2]
+        rows, heavy, clusters = self.rows, self.rows.heavy, _CONFIG.clusters
+        (n, moments, p), c = rows.inertial.shape, rows.own.shape[2]
         width = 3 + p + n * c
-        gram, right = np.zeros((CLUSTERS, width, width)), np.zeros((CLUSTERS, width))
+        gram, right = np.zeros((clusters, width, width)), np.zeros((clusters, width))
         scores, prior = np.zeros((width, width)), np.zeros((width, width))
-        prior[:3, :3] = np.eye(3) / _LOOSE**2
+        prior[:3, :3] = np.eye(3) / _CONFIG.loose**2
         own = slice(3 + p, width)  # before any data no law of friction exceeds a joint's torque
         laws = rows.own_rms * (rows.dissipated != 0.0) / self.size[:, None]
         prior[own, own] = np.diag(laws.ravel() ** 2)
@@ -219,12 +200,11 @@ class GravityModel:
             pulls = rows.gravity[j] @ fit.parameters[heavy]  # (N, 3)
             scale = self.size[j] * np.sqrt(fit.variance[j])
             design = np.concatenate([pulls, rigid, rows.own[j]], axis=1) / scale
-            target = rows.tau[j] / scale
             at = np.r_[0 : 3 + p, 3 + p + j * c : 3 + p + (j + 1) * c]
-            for b in range(CLUSTERS):
-                part = design[rows.cluster == b]
-                gram[b][np.ix_(at, at)] += part.T @ part
-                right[b][at] += part.T @ target[rows.cluster == b]
+            for b in range(clusters):
+                there = rows.cluster == b
+                gram[b][np.ix_(at, at)] += design[there].T @ design[there]
+                right[b][at] += design[there].T @ (rows.tau[j][there] / scale)
             power = fit.residual[j] ** 2 / fit.variance[j] * moments / self.effective[j]
             scores[np.ix_(at, at)] += design.T @ design * power
         theta, covariance = _jackknife(gram, right, prior, scores)
@@ -251,8 +231,7 @@ def _jackknife(gram: Array, right: Array, prior: Array, scores: Array) -> tuple[
     inverse = np.linalg.inv(normal + ridge)
     plain = np.diag(inverse @ scores @ inverse)
     ratio = np.sqrt(np.maximum(plain / np.maximum(np.diag(covariance), 1e-300), 1.0))
-    covariance = covariance * np.outer(ratio, ratio)
-    return theta, covariance + inverse @ (prior @ inverse)
+    return theta, covariance * np.outer(ratio, ratio) + inverse @ (prior @ inverse)
 
 
 def _ridge(normal: Array) -> Array:

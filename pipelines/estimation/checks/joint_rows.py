@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -66,22 +67,25 @@ def sample_motion(good: Usable) -> Sampled | None:
     spacing = max(1, round(_CONFIG.spacing / ts), thin)
     parts, done = [], 0
     for run in good.runs:
-        if (part := _sample_run(good, run, half, reach, spacing)) is not None:
-            parts.append((*part[:-1], part[-1] + done))
-            done += len(part[5])
+        part = _sample_run(good, run, half, reach, spacing)
+        if part is not None:
+            parts.append(replace(part, at=part.at + done))
+            done += len(part.torque)
     if not parts:
         return None
-    t, q, dq, ddq, coulomb, torque, at = (np.concatenate(p) for p in zip(*parts, strict=True))
-    return Sampled(t, q, dq, ddq, coulomb, torque, at.astype(int), reach, ts)
+    names = ("t", "q", "dq", "ddq", "coulomb", "torque", "at")
+    joined: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in names
+    }
+    return replace(parts[0], **joined)
 
 
-def _sample_run(
-    good: Usable, run: slice, half: int, reach: int, spacing: int
-) -> tuple[Array, ...] | None:
+def _sample_run(good: Usable, run: slice, half: int, reach: int, spacing: int) -> Sampled | None:
     log, ts = good.log, good.log.sample_time
     t = log.t[run]
     samples = round((t[-1] - t[0]) / ts) + 1
-    if samples < 4 * half + 2 * reach + 2 * spacing:
+    moments = np.arange(half + reach, samples - 3 * half - reach, spacing)
+    if samples < 4 * half + 2 * reach + 2 * spacing or not moments.size:
         return None
     grid = t[0] + ts * np.arange(samples)
     # a row that was stored again is no sample: held positions add to the acceleration
@@ -95,15 +99,12 @@ def _sample_run(
     # speeds far below the usual say nothing about the sign of friction
     slow = np.minimum(0.01, 0.02 * np.sqrt(np.mean(first**2, axis=0)) + 1e-12)
     smooth = kernel(half, 4, 0)
-    coulomb = apply_kernel(np.tanh(first / slow), smooth)
-    moments = np.arange(half + reach, samples - 3 * half - reach, spacing)
-    if not moments.size:
-        return None
+    coulomb, torque = apply_kernel(np.tanh(first / slow), smooth), apply_kernel(tau, smooth)
     spoilt = np.interp(grid, t, good.saturated[run].any(axis=1).astype(float))
     near = apply_kernel(spoilt[:, None], np.ones(2 * half + 1))[:, 0]
-    moments = moments[(near < 0.5)[moments]]
-    motion = (value[moments], first[moments], second[moments], coulomb[moments - half])
-    return grid[moments + half], *motion, apply_kernel(tau, smooth), moments.astype(float)
+    at = moments[(near < 0.5)[moments]]
+    motion = (value[at], first[at], second[at], coulomb[at - half])
+    return Sampled(grid[at + half], *motion, torque, at, reach, ts)
 
 
 def _filled(grid: Array, t: Array, x: Array, spoilt: Mask) -> Array:
@@ -162,10 +163,10 @@ def _own(motion: Sampled, j: int) -> Array:
 
 
 def relative_residual(rows: Sequence[Row], tau: Array) -> Array:
-    """(rows, torques) what of each torque's variation each joint's row cannot explain, 0 … 1."""
+    """(joints,) what of each torque's variation its joint's row cannot explain, 0 … 1."""
     size = np.linalg.norm(tau - tau.mean(axis=0), axis=0)
-    size = np.where(size > 0, size, 1.0)
-    return np.stack([np.linalg.norm(row.residual(tau), axis=0) / size for row in rows])
+    left = [np.linalg.norm(row.residual(own)) for row, own in zip(rows, tau.T, strict=True)]
+    return np.asarray(left / np.where(size > 0, size, 1.0))
 
 
 @dataclass(frozen=True)

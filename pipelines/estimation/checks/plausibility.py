@@ -2,13 +2,13 @@
 
     for check in plausibility(Subject(log)): ...
 
-No parameter of the arm has to be known. Each joint's torque is explained by its own row of the
-rigid body with friction (`joint_rows`); then other explanations are tried on the same rows: another
-order of columns, another sign, scale or time. An alternative is reported only where the log as it
-is is explained badly **and** the alternative explains it well: an arm with friction the model
-lacks, with a worn gear or with a late drive is badly explained too, but nothing explains it better,
-and what is wrong with it is for `diagnose` to say. Where the log describes its controller, that is
-compared as well.
+No parameter of the arm has to be known. Each joint's torque is explained by the rigid body with
+friction (`joint_rows`); then other explanations are tried on the same rows: another sign, scale or
+time. An alternative is reported only where the log as it is is explained badly **and** the
+alternative explains it well: an arm with friction the model lacks, with a worn gear or with a late
+drive is badly explained too, but nothing explains it better, and what is wrong with it is for
+`diagnose` to say. Where the log describes its controller, that is compared as well. The order of
+the columns is the torque boundary's question.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations, permutations
 
 import numpy as np
 
@@ -55,8 +54,6 @@ _FACTORS = {
 }
 # what a file may have every angle in
 _ANGLE_UNITS = {name: factor for name, factor in _FACTORS.items() if "pi" in name}
-_UNIT_REMEDY = "correct the unit of the angles on import, rad or deg or turns: it is declared for "
-_UNIT_REMEDY += "all of them"
 _GRID, _FINER = 25, 6  # numerics: points, and how often a grid is laid about the best of the last
 
 
@@ -73,20 +70,15 @@ class Evidence:
         return row_fits(self.body, self.motion)
 
     @cached_property
-    def table(self) -> Array:
-        """(rows, torques) relative residual of every torque on every joint's row."""
-        return relative_residual(self.rows, self.motion.tau)
-
-    @property
     def residual(self) -> Array:
-        return np.diag(self.table)
+        """(joints,) relative residual of each torque by parameters of its own row."""
+        return relative_residual(self.rows, self.motion.tau)
 
     @cached_property
     def telling(self) -> Indices:
         """The joints (from 0) whose row can tell anything: those that move.
 
-        A joint that is held sways within its dry friction, of which no row knows, while the moving
-        joints' motion is in every row: another joint's row may explain its torque better.
+        A joint that is held sways within its dry friction, of which no row knows.
         """
         travel = self.subject.travel
         return np.flatnonzero(travel >= _CONFIG.held * travel.max())
@@ -99,17 +91,16 @@ class Evidence:
 
     def alone(self, motion: Sampled) -> Array:
         """(telling joints,) residual of each by parameters of its own."""
-        rows = row_fits(self.body, motion)
-        return np.diag(relative_residual(rows, motion.tau))[self.telling]
+        return relative_residual(row_fits(self.body, motion), motion.tau)[self.telling]
 
     def together(self, motion: Sampled) -> Array:
         """(telling joints,) residual where all rows share the rigid body's parameters."""
-        told = self.telling.tolist()
-        return SharedRows.of(self.body, motion, told).left(np.ones(len(told)))
+        shared = SharedRows.of(self.body, motion, self.telling.tolist())
+        return shared.left(np.ones(len(self.telling)))
 
 
 def plausibility(subject: Subject) -> tuple[Check, ...]:
-    """Return S10, S13, S14, S15, T06 and D09 of one log; nothing where it tells nothing."""
+    """Return S10, S14, S15, T06 and D09 of one log; nothing where it tells nothing."""
     return tuple(found for found in plausibility_findings(subject) if isinstance(found, Check))
 
 
@@ -117,130 +108,62 @@ def plausibility_findings(subject: Subject) -> tuple[Check | NotTested, ...]:
     """Return the same, and which of these questions the log leaves open, and why."""
     evidence = _evidence(subject)
     found = _found(subject, evidence)
-    if not isinstance(evidence, Evidence) or _closes(found):
+    if isinstance(evidence, str) or _closes(found):
         return found  # what such a torque leaves is no noise to hold the columns against
     return (*found, *excited(subject))
 
 
 def mismatches(subject: Subject) -> tuple[Check, ...]:
-    """Return the checks S10, S13, S14, S15 and T06 of a log that is fitted, other than "ok"."""
+    """Return the checks S10, S14, S15 and T06 of a log that is fitted, other than "ok"."""
     found = _found(subject, _evidence(subject))
-    return tuple(check for check in found if isinstance(check, Check) and check.level != "ok")
+    return tuple(one for one in found if isinstance(one, Check) and one.level != "ok")
 
 
 def _closes(found: Findings) -> bool:
-    """Return whether a finding closes a gate."""
     return any(isinstance(one, Check) and one.gate and one.level != "ok" for one in found)
 
 
-def _evidence(subject: Subject) -> Evidence | tuple[NotTested, ...]:
-    """Return the torque rows of a log; or why there are none."""
-    if not subject.sampled or not subject.good.time.known:  # a plan has no positions
-        return ()
-    log, good = subject.log, subject.good
-    reason, body = "", rigid_body(log.robot)
-    numbers = len(body.parameters) + 4
+def _evidence(subject: Subject) -> Evidence | str:
+    """Return the rows of a log; why there are none; empty for a plan, which has no positions."""
+    if not subject.sampled or not subject.good.time.known:
+        return ""
+    log, good, body = subject.log, subject.good, rigid_body(subject.log.robot)
     if log.experiment not in ("excitation", "free", "writing"):
-        reason = f"a '{log.experiment}' log does not move the whole arm"
-    elif not good.runs:
-        reason = "no stretch of even samples is long enough"
-    elif (spread(good.log.tau) == 0).any() or (subject.travel == 0).any():
-        reason = "a joint's position or torque never changes"
-    else:
-        motion = sample_motion(good)
-        if motion is not None and len(motion.t) >= 4 * numbers:
-            return Evidence(subject, body, motion)
-        reason = f"too short for the {numbers} numbers that explain a joint's torque"
-    codes = ("S13", "S14", "S15", "T06")
-    return tuple(found for code in codes for found in subject.cannot_tell(code, reason))
+        return f"a '{log.experiment}' log does not move the whole arm"
+    if not good.runs:
+        return "no stretch of even samples is long enough"
+    if (spread(good.log.tau) == 0).any() or (subject.travel == 0).any():
+        return "a joint's position or torque never changes"
+    numbers, motion = len(body.parameters) + 4, sample_motion(good)
+    if motion is None or len(motion.t) < 4 * numbers:
+        return f"too short for the {numbers} numbers that explain a joint's torque"
+    return Evidence(subject, body, motion)
 
 
-def _found(
-    subject: Subject, evidence: Evidence | tuple[NotTested, ...]
-) -> tuple[Check | NotTested, ...]:
+def _found(subject: Subject, e: Evidence | str) -> tuple[Check | NotTested, ...]:
     """Return what motion shows of a torque; where that closes no gate, what the controller does.
 
-    Of columns in the wrong place, or an angle in the wrong scale, nothing else is said.
+    Of an angle in the wrong scale, nothing else is said.
     """
-    found: Findings = ()
-    if isinstance(evidence, Evidence):
-        e = evidence
-        if misplaced := _torque_columns(e) or _position_columns(e) or _encoder_scale(e):
+    if isinstance(e, Evidence):
+        if misplaced := _encoder_scale(e):
             return tuple(misplaced)
-        found = (*_explained(e), *_signs(e), *_sizes(e), *_clock(e))
+        found = [*_signs(e), *_sizes(e), *_clock(e)]
     else:
-        found = evidence
+        codes = ("S14", "S15", "T06") if e else ()
+        found = [one for code in codes for one in subject.cannot_tell(code, e)]
     if _closes(found):
         return tuple(found)
     clear = {one.code for one in found if isinstance(one, Check) and one.level == "ok"}
     if "RRID-S15" in clear:  # gains may be described wrong, and the torque be right
         clear.add("RRID-S10")
     told = [check for check in against_command(subject) if check.code not in clear - {"RRID-T06"}]
-    codes = {check.code for check in told}
-    return (*told, *(one for one in found if one.code not in codes))
-
-
-def _torque_columns(e: Evidence) -> list[Check]:
-    """S13: would the torques fit better in another order?"""
-    square, n = e.table**2, len(e.table)
-    best = min(_orders(e, 6), key=lambda order: square[np.arange(n), order].sum())
-    moved = np.flatnonzero(best != np.arange(n))
-    before, after = e.residual[moved], e.table[moved, best[moved]]
-    if not len(moved) or not _better(before, after) or (after > 0.6 * before).any():
-        return []
-    return [_swapped(e, "tau", best, before, after)]
-
-
-def _position_columns(e: Evidence) -> list[Check]:
-    """S13: would the positions alone fit better in another order?
-
-    Positions and torques together: the torque boundary.
-    """
-    if _rms(e.residual[e.telling]) < _CONFIG.bad or len(e.telling) < 2:
-        return []
-    m, names = e.few, ("q", "dq", "ddq", "coulomb")
-    tried = []
-    for order in _orders(e, 3)[1:]:
-        turned = replace(m, **{name: getattr(m, name)[:, order] for name in names})
-        tried.append((e.alone(turned), order))
-    after, order = min(tried, key=lambda one: _rms(one[0]))
-    before = e.alone(m)
-    return [_swapped(e, "q", order, before, after)] if _better(before, after) else []
-
-
-def _swapped(e: Evidence, signal: str, order: Indices, before: Array, after: Array) -> Check:
-    moved = np.flatnonzero(order != np.arange(len(order))).tolist()
-    how = f"in the order {','.join(str(order[j] + 1) for j in moved)}"
-    if len(moved) == 2:
-        how = "swapped"
-    words = f"{signal}: columns {','.join(str(j + 1) for j in moved)} fit {how}, residual "
-    words += f"{_rms(before):.2f} -> {_rms(after):.2f}"
-    remedy = "correct the column map of the import, or the wiring of the drives"
-    say = e.subject.say
-    return say("S13", "warn", words, signal=signal, joint=moved[0], gate=True, remedy=remedy)
-
-
-def _orders(e: Evidence, every: int) -> list[Indices]:
-    """Return every order of the joints that move, of many every swap; first the log's own."""
-    told = e.telling.tolist()
-    moves = [list(order) for order in permutations(told)] if len(told) <= every else [told]
-    for a, b in () if len(told) <= every else combinations(range(len(told)), 2):
-        moves.append([told[{a: b, b: a}.get(k, k)] for k in range(len(told))])
-    orders = []
-    for moved in moves:
-        order = np.arange(len(e.table))
-        order[told] = moved
-        orders.append(order)
-    return orders
+    codes_told = {check.code for check in told}
+    return (*told, *(one for one in found if one.code not in codes_told))
 
 
 def _rms(x: Array) -> float:
     return float(np.sqrt(np.mean(np.square(x))))
-
-
-def _better(before: Array, after: Array) -> bool:
-    good = _rms(after) < _CONFIG.good and _rms(after) < _CONFIG.much_better * _rms(before)
-    return _rms(before) > _CONFIG.bad and good
 
 
 def _encoder_scale(e: Evidence) -> list[Check]:
@@ -258,11 +181,12 @@ def _encoder_scale(e: Evidence) -> list[Check]:
     if found is None:
         return []
     before, after, joint, factor = found
-    residual = f"residual {before:.2g} -> {after:.2g}"
-    say = e.subject.say
+    residual, say = f"residual {before:.2g} -> {after:.2g}", e.subject.say
     if joint is None:
         words = f"q fits if every angle is multiplied by {factor}, {residual}"
-        return [say("S15", "warn", words, signal="q", gate=True, remedy=_UNIT_REMEDY)]
+        remedy = "correct the unit of the angles on import, rad or deg or turns: it is declared "
+        remedy += "for all of them"
+        return [say("S15", "warn", words, signal="q", gate=True, remedy=remedy)]
     words = f"q of joint {joint + 1} fits if multiplied by {factor}, {residual}"
     remedy = "correct the gear ratio, the direction or the counts per turn of this encoder"
     torque = torque_scale(e) if shared else None
@@ -319,7 +243,10 @@ class TorqueScale:
 
 
 def torque_scale(e: Evidence) -> TorqueScale | None:
-    """Return the joint and factor that leave least, where the log as it is leaves far more."""
+    """Return the joint and factor that leave least, where the log as it is leaves far more.
+
+    All torques come from one set of rigid parameters.
+    """
     told = e.telling.tolist()
     if len(told) < 2:
         return None
@@ -327,51 +254,23 @@ def torque_scale(e: Evidence) -> TorqueScale | None:
     before = _rms(rows.left(np.ones(len(told))))
     if before < _SCALE.bad:
         return None
-    found = sorted((*_least(rows, place, len(told)), joint) for place, joint in enumerate(told))
-    after, factor, joint = found[0]
+    found = []
+    for place, joint in enumerate(told):
+        low, high = -np.log(_SCALE.most), np.log(_SCALE.most)
+        for _ in range(_FINER):  # ever finer grids
+            grid = np.linspace(low, high, _GRID)
+            factors = np.ones((_GRID, len(told)))
+            factors[:, place] = np.exp(grid)
+            best, at = min((_rms(rows.left(row)), k) for k, row in enumerate(factors))
+            low, high = grid[max(at - 1, 0)], grid[min(at + 1, _GRID - 1)]
+        found.append((best, float(factors[at, place]), joint))
+    after, factor, joint = min(found)
     # the end of the search is no finding
     inside = _SCALE.least < max(factor, 1.0 / factor) < _SCALE.most * (1.0 - 1e-9)
     if not inside or after > _SCALE.better * before:
         return None
-    alike = [(other, by) for left, by, other in found[1:] if left < _SCALE.as_good * after]
-    return TorqueScale(joint, factor, before, after, tuple(alike))
-
-
-def _least(rows: SharedRows, place: int, n: int) -> tuple[float, float]:
-    """Return residual and factor of one joint's torque by which all rows fit best."""
-
-    def left(log_factor: float) -> float:
-        factors = np.ones(n)
-        factors[place] = np.exp(log_factor)
-        return _rms(rows.left(factors))
-
-    low, high = -np.log(_SCALE.most), np.log(_SCALE.most)
-    for _ in range(_FINER):  # ever finer grids
-        grid = np.linspace(low, high, _GRID)
-        best, at = min((left(float(x)), k) for k, x in enumerate(grid))
-        low, high = grid[max(at - 1, 0)], grid[min(at + 1, _GRID - 1)]
-    return best, float(np.exp(grid[at]))
-
-
-def _explained(e: Evidence) -> list[Check]:
-    """S13: a joint whose torque nothing explains, where others are, has another channel's."""
-    told, own = e.telling, e.residual[e.telling]
-    lost = own > _CONFIG.unexplained
-    rest = own[~lost]
-    clear = lost.any() and rest.size and rest.max() < _CONFIG.explained
-    if not clear or own[lost].min() <= _CONFIG.apart * rest.max():
-        words = ", ".join(f"{v:.2g}" for v in own)
-        held = "" if len(told) == len(e.table) else "; joints that are only held cannot tell"
-        fine = f"each joint's torque fits its own motion best, relative residual {words}{held}"
-        return e.subject.ok("S13", fine)
-    others, found = ", ".join(f"{v:.2g}" for v in rest), []
-    remedy = "unless a diagnosis names a cause there, look whether this column is that joint's "
-    remedy += "torque, or repeats another's"
-    for j in told[lost].tolist():
-        residual = f"relative residual {e.residual[j]:.2g}, others {others}"
-        words = f"joint {j + 1}'s torque is not explained by its motion: {residual}"
-        found.append(e.subject.say("S13", "warn", words, signal="tau", joint=j, remedy=remedy))
-    return found
+    near = [(other, by) for left, by, other in sorted(found) if left < _SCALE.as_good * after]
+    return TorqueScale(joint, factor, before, after, tuple(one for one in near if one[0] != joint))
 
 
 def _signs(e: Evidence) -> list[Check]:
@@ -380,11 +279,10 @@ def _signs(e: Evidence) -> list[Check]:
     if not flipped:
         return e.subject.ok("S14", "inertia of every joint is positive", signal="tau")
     where = ", ".join(f"joint {j + 1}" for j in flipped)
-    if len(flipped) == len(e.table) > 1:
+    if len(flipped) == len(e.rows) > 1:
         where = "all joints"
     words = f"the torque of {where} looks flipped: inertia and friction come out negative"
-    remedy = "change the sign of this torque on import, or of its position"
-    say = e.subject.say
+    remedy, say = "change the sign of this torque on import, or of its position", e.subject.say
     return [
         say("S14", "warn", words, signal="tau", joint=j, gate=True, remedy=remedy) for j in flipped
     ]
@@ -424,22 +322,31 @@ def _sizes(e: Evidence) -> Findings:
     Within what load and friction can make of it.
     """
     subject, known = e.subject, e.body.known_parameters()
+    slopes = {} if known is None else _slopes(e, known)
+    far = {j: s for j, s in slopes.items() if s > _CONFIG.ratio or 0 < s < 1 / _CONFIG.ratio}
+    told = [(j, s, f"tau of joint {j + 1} is {s:.3g} times") for j, s in far.items()]
+    need = "what the described links need"
+    if not told and (found := torque_scale(e)) is not None:
+        places = [f"tau of joint {found.joint + 1} is {found.factor:.3g} times"]
+        places += [f"tau of joint {joint + 1} {factor:.3g} times" for joint, factor in found.others]
+        need = "what the other joints' torques need"
+        need += ": only their ratio shows" if found.others else ""
+        need += f", residual {found.before:.2g} -> {found.after:.2g}"
+        told = [(found.joint, found.factor, ", or ".join(places))]
+    checks = []
+    for joint, factor, words in told:
+        remedy = f"look for a gear ratio or torque constant of about {factor:.3g} or "
+        remedy += f"{1 / factor:.3g} that was applied twice or not at all, or another unit of the "
+        remedy += f"angles; tau of joint {joint + 1} divided by {factor:.3g} would fit"
+        words = f"{words} {need}"
+        checks.append(
+            subject.say("S15", "warn", words, signal="tau", joint=joint, gate=True, remedy=remedy)
+        )
+    if checks:
+        return checks
     if known is None:
         words = "the robot's description has no masses and inertias to compare with"
-        return _against_the_others(e) or subject.cannot_tell("S15", words, signal="tau")
-    slopes = _slopes(e, known)
-    far = _far(slopes)
-    if far and (unit := _angle_unit(e, known, slopes)):
-        return [unit]
-    found = []
-    for j, slope in far.items():
-        words = f"tau of joint {j + 1} is {slope:.3g} times what the described links need"
-        remedy = _divided(j + 1, slope)
-        found.append(
-            subject.say("S15", "warn", words, signal="tau", joint=j, gate=True, remedy=remedy)
-        )
-    if found or (found := _against_the_others(e)):
-        return found
+        return subject.cannot_tell("S15", words, signal="tau")
     if not slopes:
         words = "the described masses and inertias do not explain the torque of any joint, so that "
         words += "a wrong gear ratio or unit would not show"
@@ -448,95 +355,34 @@ def _sizes(e: Evidence) -> Findings:
     return subject.ok("S15", f"torque over that of the described links: {seen}", signal="tau")
 
 
-def _slopes(e: Evidence, known: Array, angles: float = 1.0) -> dict[int, float]:
-    """Return torque over that of the described links, of each joint that they explain.
-
-    Args:
-        angles: times which every angle is taken.
-    """
+def _slopes(e: Evidence, known: Array) -> dict[int, float]:
+    """Return torque over that of the described links, of each joint that they explain."""
     motion, slopes = e.motion, {}
-    scale = np.where([one.revolute for one in e.subject.log.robot.joints], angles, 1.0)
-    expected = e.body.torque(motion.q * scale, motion.dq * scale, motion.ddq * scale, known)
+    expected = e.body.torque(motion.q, motion.dq, motion.ddq, known)
     for j in e.telling.tolist():
-        tau, parts = motion.tau[:, j], (motion.dq[:, j], motion.coulomb[:, j])
-        friction = np.stack([*parts, np.ones(len(tau))], axis=-1)
-        columns = np.column_stack([expected[:, j], friction])
-        (without, _), (left, fit) = (_unexplained(own, tau) for own in (friction, columns))
+        tau = motion.tau[:, j]
+        columns = [motion.dq[:, j], motion.coulomb[:, j], np.ones(len(tau)), expected[:, j]]
+        fits = [np.linalg.lstsq(np.stack(columns[:k], axis=1), tau, rcond=None)[0] for k in (3, 4)]
+        without, left = (
+            np.linalg.norm(tau - np.stack(columns[: len(fit)], axis=1) @ fit) for fit in fits
+        )
         # else the described links are not this arm's; they say nothing
-        if left <= _CONFIG.ratio_residual and left <= 0.4 * without:
-            slopes[j] = float(fit[0])
+        size = np.linalg.norm(tau - tau.mean())
+        if left <= _CONFIG.ratio_residual * size and left <= 0.4 * without:
+            slopes[j] = float(fits[1][3])
     return slopes
-
-
-def _unexplained(columns: Array, tau: Array) -> tuple[float, Array]:
-    """Return the share of the variation of `tau` that `columns` leave, and their numbers."""
-    fit = np.linalg.lstsq(columns, tau, rcond=None)[0]
-    left = float(np.linalg.norm(tau - columns @ fit) / np.linalg.norm(tau - tau.mean()))
-    return left, np.asarray(fit, dtype=np.float64)
-
-
-def _far(slopes: dict[int, float]) -> dict[int, float]:
-    far = _CONFIG.ratio
-    return {j: slope for j, slope in slopes.items() if slope > far or 0 < slope < 1 / far}
-
-
-def _angle_unit(e: Evidence, known: Array, as_declared: dict[int, float]) -> Check | None:
-    """S15: in another unit of angles the described links explain the torques of more joints.
-
-    Each as large as they need. Where no more are explained, as of one joint that only turns
-    inertia, a gear ratio would do the same.
-    """
-    joint, far = max(_far(as_declared).items(), key=lambda one: abs(np.log(one[1])))
-    for name, factor in _ANGLE_UNITS.items():
-        slopes = _slopes(e, known, factor)
-        more = as_declared.keys() < slopes.keys() and not _far(slopes)
-        if more and min(slopes.values()) > 0.0:
-            times = f"{min(slopes.values()):.3g} to {max(slopes.values()):.3g} times"
-            words = f"the unit of q looks wrong: as declared, tau of joint {joint + 1} is "
-            words += f"{far:.3g} times what the described links need; with every angle "
-            words += f"multiplied by {name}, {times}"
-            return e.subject.say("S15", "warn", words, signal="q", gate=True, remedy=_UNIT_REMEDY)
-    return None
-
-
-def _against_the_others(e: Evidence) -> list[Check]:
-    """S15 without a description: all torques come from one set of rigid parameters."""
-    if (found := torque_scale(e)) is None:
-        return []
-    places = [f"joint {found.joint + 1} is {found.factor:.3g} times"]
-    places += [f"joint {joint + 1} {factor:.3g} times" for joint, factor in found.others]
-    ratio = ": only their ratio shows" if found.others else ""
-    words = f"tau of {', or tau of '.join(places)} what the other joints' torques need{ratio}, "
-    words += f"residual {found.before:.2g} -> {found.after:.2g}"
-    remedy, say = _divided(found.joint + 1, found.factor), e.subject.say
-    return [say("S15", "warn", words, signal="tau", joint=found.joint, gate=True, remedy=remedy)]
-
-
-def _divided(joint: int, factor: float) -> str:
-    """Return S15's remedy for a torque."""
-    constants = f"about {factor:.3g} or {1 / factor:.3g}"
-    fit = f"tau of joint {joint} divided by {factor:.3g} would fit"
-    return (
-        f"look for a gear ratio or torque constant of {constants} that was applied twice or not at "
-        f"all; {fit}"
-    )
 
 
 def _clock(e: Evidence) -> Findings:
     """T06: position and torque were stamped by the same clock."""
     subject, told = e.subject, e.telling.tolist()
     found = clock_offset(e.rows, e.motion, told)
-    if found is None:
-        words = "no torque follows its motion closely enough to time it"
-        return subject.cannot_tell("T06", words, signal="tau")
-    if found.joints < 2:
-        words = "one joint's torque alone is understood, and what its friction does at a reversal "
-        words += "looks like an offset of the clocks"
+    if found is None or found.joints < 2:
+        words = "the torque of fewer than two joints follows its motion closely enough to time it"
         return subject.cannot_tell("T06", words, signal="tau")
     late, bound = abs(found.samples), found.bound
     size = f"{late:.2f} ± {bound:.2f} samples ({late * 1e3 * e.motion.sample_time:.3g} ms)"
-    side = "behind" if found.samples > 0 else "ahead of"
-    words = f"torque lies {size} {side} the motion"
+    words = f"torque lies {size} {'behind' if found.samples > 0 else 'ahead of'} the motion"
     drift = f"{found.drift:+.2f} ± {found.drift_bound:.2f} samples over the log"
     if abs(found.drift) > 1.0 + found.drift_bound:
         gate = abs(found.drift) > 1.0 + _CONFIG.drifts * found.drift_bound

@@ -28,25 +28,14 @@ from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.estimation.checks.joint_rows import Sampled
 from pipelines.io.robot import RobotDescription
 
-__all__ = [
-    "CLUSTERS",
-    "Array",
-    "GenericArm",
-    "RowFilter",
-    "TorqueRows",
-    "generic_arm",
-    "own_columns",
-    "torque_rows",
-]
-
 Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.intp]
 
 _ELSEWHERE = np.array([3.1, -5.3, 7.7])  # [m/s^2] along no axis: shows all that any gravity shows
 _SEED = 20040509  # numerics
 _OVERLAP = 6  # numerics: moments that are kept within the length of the filter: no aliasing
 _RIDGE = 1e-6  # numerics: of equilibrated columns, for a first estimate of the load alone
 _CONFIG = BoundaryConfig()
-CLUSTERS = _CONFIG.clusters
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,17 +44,13 @@ class TorqueRows:
 
     inertial: Array  # Y_0 (n, N, p)
     gravity: Array  # Y_k (n, N, 3, m) [per m/s^2]
-    heavy: npt.NDArray[np.intp]  # (m,) indices of the parameters on which gravity acts
+    heavy: Indices  # (m,) indices of the parameters on which gravity acts
     own: Array  # F (n, N, c): rotor inertia, friction, offset
     dissipated: Array  # (n, c) <F v> / (rms τ · rms v): power of each friction column; else 0
     own_rms: Array  # (n, c) RMS of the own columns before the filter
     tau: Array  # (n, N) [N m]
-    start: npt.NDArray[np.intp]  # first moment of each stretch of even samples
-    cluster: npt.NDArray[np.intp]  # (N,) moments of one cluster share the model's error
-
-    @property
-    def n_joints(self) -> int:
-        return int(self.tau.shape[0])
+    start: Indices  # first moment of each stretch of even samples
+    cluster: Indices  # (N,) moments of one cluster share the model's error
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,14 +59,13 @@ class GenericArm:
 
     chain: SerialChain  # without gravity
     columns: tuple[int, ...]  # (p,) standard parameters, 10 · link + position
-    combine: Array  # (p, 10 · links): base parameters of standard parameters
 
 
 def generic_arm(robot: RobotDescription) -> GenericArm:
     """Return the geometry and the base parameters of `robot` under gravity from anywhere."""
     chain = serial_chain(robot)
     base = base_set(replace(chain, gravity=_ELSEWHERE), np.random.default_rng(_SEED))
-    return GenericArm(replace(chain, gravity=np.zeros(3)), base.chosen, base.combine)
+    return GenericArm(replace(chain, gravity=np.zeros(3)), base.chosen)
 
 
 def torque_rows(
@@ -96,7 +80,7 @@ def torque_rows(
         q_order: of the positions; None: as logged.
         tau_order: of the torques; None: as logged.
     """
-    n = len(arm.chain.revolute)
+    n, p = len(arm.chain.revolute), len(arm.columns)
     of_q, of_tau = (list(range(n) if order is None else order) for order in (q_order, tau_order))
     q, dq, ddq, coulomb = (
         np.concatenate([getattr(motion, name)[:, of_q] for motion in motions])
@@ -104,35 +88,29 @@ def torque_rows(
     )
     tau = np.concatenate([motion.tau[:, of_tau] for motion in motions])
     heavy = np.array([k for k, column in enumerate(arm.columns) if column % 10 < 4], dtype=int)
-    inertial = regressor(arm.chain, q, dq, ddq, arm.columns)
-    still = np.zeros_like(q)
-    masses = [arm.columns[k] for k in heavy]
+    masses, still = [arm.columns[k] for k in heavy], np.zeros_like(q)
     pulled = [regressor(replace(arm.chain, gravity=a), q, still, still, masses) for a in np.eye(3)]
+    inertial = regressor(arm.chain, q, dq, ddq, arm.columns)
     rigid = np.concatenate([inertial, *pulled], axis=2).transpose(1, 0, 2)
     smooth = RowFilter(motions)
-    own = own_columns(dq, ddq, coulomb)
-    torque = smooth(tau.T[:, :, None])[:, :, 0]
-    slow = smooth(rigid)
-    load = _load(slow, smooth(own), torque, rigid)
-    friction = np.abs(load) * coulomb.T  # of gears, in proportion to the load
-    own = np.concatenate([own[:, :, :-1], friction[:, :, None], own[:, :, -1:]], axis=2)
-    dissipated = np.einsum("jnc,nj->jc", own, dq) / len(dq)
-    own_rms = np.sqrt(np.mean(own**2, axis=1))
+    own, torque, slow = own_columns(dq, ddq, coulomb), smooth(tau.T[:, :, None]), smooth(rigid)
+    # of gears, in proportion to the load
+    friction = np.abs(_load(slow, smooth(own), torque, rigid)) * coulomb.T[:, :, None]
+    own = np.concatenate([own[:, :, :-1], friction, own[:, :, -1:]], axis=2)
     scale = np.sqrt(np.mean(dq**2, axis=0) * np.mean(tau**2, axis=0))
+    dissipated = np.einsum("jnc,nj->jc", own, dq) / len(dq)
     dissipated = dissipated / np.where(scale > 0.0, scale, np.inf)[:, None]
     dissipated[:, [0, -1]] = 0.0
-    p = len(arm.columns)
-    moments = torque.shape[1]
     return TorqueRows(
-        slow[:, :, :p],
-        slow[:, :, p:].reshape(n, moments, 3, len(heavy)),
-        heavy,
-        smooth(own),
-        dissipated,
-        own_rms,
-        torque,
-        smooth.start,
-        smooth.clusters(q),
+        inertial=slow[:, :, :p],
+        gravity=slow[:, :, p:].reshape(n, torque.shape[1], 3, len(heavy)),
+        heavy=heavy,
+        own=smooth(own),
+        dissipated=dissipated,
+        own_rms=np.sqrt(np.mean(own**2, axis=1)),
+        tau=torque[:, :, 0],
+        start=smooth.start,
+        cluster=smooth.clusters(q),
     )
 
 
@@ -140,55 +118,46 @@ def own_columns(dq: Array, ddq: Array, coulomb: Array) -> Array:
     """Return the columns (n, N, c) of rotor inertia, friction in speed, and offset."""
     size = np.sqrt(np.mean(dq**2, axis=0))
     size = np.where(size > 0.0, size, 1.0)
-    laws = [
-        coulomb,
-        *(np.tanh(dq / (width * size)) for width in _CONFIG.widths),
-        dq,
-        dq * np.abs(dq),
-    ]
-    return np.stack([ddq, *laws, np.ones_like(dq)], axis=-1).transpose(1, 0, 2)
+    bends = [np.tanh(dq / (width * size)) for width in _CONFIG.widths]
+    columns = [ddq, coulomb, *bends, dq, dq * np.abs(dq), np.ones_like(dq)]
+    return np.stack(columns, axis=-1).transpose(1, 0, 2)
 
 
 def _load(slow: Array, own: Array, torque: Array, rigid: Array) -> Array:
-    """Return the torque (n, N) of the rigid body as each joint's own row has it, without friction.
+    """Return the torque (n, N, 1) of the rigid body as each joint's own row has it, without
+    friction.
 
     The logged torque cannot stand for it: it contains the friction that is to be explained.
     """
     design = np.concatenate([slow, own], axis=2)
     scale = np.linalg.norm(design, axis=1, keepdims=True)
-    design = design / np.where(scale > 0.0, scale, 1.0)
+    scale = np.where(scale > 0.0, scale, 1.0)
+    design = design / scale
     normal = design.transpose(0, 2, 1) @ design + _RIDGE * np.eye(design.shape[2])
-    fit = np.linalg.solve(normal, design.transpose(0, 2, 1) @ torque[:, :, None])
-    weight = fit / np.where(scale > 0.0, scale, 1.0).transpose(0, 2, 1)
-    return np.asarray((rigid @ weight[:, : rigid.shape[2]])[:, :, 0])
+    fit = np.linalg.solve(normal, design.transpose(0, 2, 1) @ torque)
+    return np.asarray(rigid @ (fit / scale.transpose(0, 2, 1))[:, : rigid.shape[2]])
 
 
 class RowFilter:
     """A Hann window over a part of the motion's period, stretch by stretch."""
 
     def __init__(self, motions: Sequence[Sampled]) -> None:
-        self.edges: list[tuple[int, int]] = []
-        spacing, done = [], 0
+        edges, spacing, rates, done = list[tuple[int, int]](), [], [], 0
         for motion in motions:
             step = float(np.median(np.diff(motion.t)))
             cuts = 1 + np.flatnonzero(np.abs(np.diff(motion.t) - step) > 0.5 * step)
-            bounds = [done, *(done + cuts).tolist(), done + len(motion.t)]
-            self.edges += list(pairwise(bounds))
+            edges += pairwise([done, *(done + cuts).tolist(), done + len(motion.t)])
             spacing.append(step)
+            speed = np.sqrt(np.mean(motion.dq**2, axis=0))
+            rates.append(np.max(speed / np.maximum(np.std(motion.q, axis=0), 1e-12)))
             done += len(motion.t)
-        self.spacing = float(np.median(np.asarray(spacing)))
-        rates = [
-            np.sqrt(np.mean(motion.dq**2, axis=0)) / np.maximum(np.std(motion.q, axis=0), 1e-12)
-            for motion in motions
-        ]
         period = 2.0 * np.pi / max(float(np.max(rates)), 1e-12)
-        wanted = min(
-            _CONFIG.periods * period / self.spacing, 0.1 * max(b - a for a, b in self.edges)
-        )
+        wanted = _CONFIG.periods * period / float(np.median(spacing))
+        wanted = min(wanted, 0.1 * max(b - a for a, b in edges))
         self.step = max(1, int(wanted / _OVERLAP))
         self.steps = max(1, min(int(wanted), _OVERLAP))  # within the length of the window
         length = self.step * self.steps
-        self.edges = [edge for edge in self.edges if edge[1] - edge[0] >= length]
+        self.edges = [(a, b) for a, b in edges if b - a >= length]
         window = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
         self.window = (window / window.sum()).reshape(self.steps, self.step)
         self.count = [(b - a - length) // self.step + 1 for a, b in self.edges]
@@ -200,40 +169,33 @@ class RowFilter:
         for (a, _), count in zip(self.edges, self.count, strict=True):
             blocks = count + self.steps - 1
             part = columns[:, a : a + blocks * self.step]
-            shape = (len(columns), blocks, self.step, columns.shape[2])
-            sums = self.window @ part.reshape(shape)
+            sums = self.window @ part.reshape(len(columns), blocks, self.step, columns.shape[2])
             outputs.append(sum(sums[:, k : k + count, k] for k in range(self.steps)))
         return np.concatenate(outputs, axis=1)
 
-    def clusters(self, q: Array) -> npt.NDArray[np.intp]:
+    def clusters(self, q: Array) -> Indices:
         """Return the cluster (N,) of each moment: of equal stretches of time, or of the phase.
 
         A model errs alike each time that a motion is repeated: a period counts once.
         """
-        slow = self(q.T[:, :, None])[:, :, 0]
-        total = slow.shape[1]
-        k = int(np.argmax(self.count))
-        period = _period(slow[:, self.start[k] : self.start[k] + self.count[k]])
+        slow, longest = self(q.T[:, :, None])[:, :, 0], int(np.argmax(self.count))
+        first = self.start[longest]
+        period = _period(slow[:, first : first + self.count[longest]])
         if period is None:
-            return np.asarray(np.arange(total) * CLUSTERS // total)
+            total = slow.shape[1]
+            return np.asarray(np.arange(total) * _CONFIG.clusters // total)
         place = np.concatenate([np.arange(count) for count in self.count])
-        return np.asarray(((place % period) * CLUSTERS / period).astype(int))
+        return np.asarray(((place % period) * _CONFIG.clusters / period).astype(int))
 
 
-def _period(q: Array) -> float | None:
+def _period(q: Array) -> int | None:
     """Return after how many moments the motion q (n, N) repeats; None where it does not."""
-    moments = q.shape[1]
     power = np.maximum(2.0 * np.var(q, axis=1), 1e-300)
-    apart = [
-        float(np.mean(np.mean((q[:, lag:] - q[:, :-lag]) ** 2, axis=1) / power))
-        for lag in range(1, 2 * moments // 3)
-    ]
-    left = np.flatnonzero(np.array(apart) > _CONFIG.moved_on)
-    if not left.size:
-        return None
-    back = np.flatnonzero(np.array(apart[left[0] :]) < _CONFIG.returned)
+    lags = range(1, 2 * q.shape[1] // 3)
+    apart = [np.mean(np.mean((q[:, lag:] - q[:, :-lag]) ** 2, axis=1) / power) for lag in lags]
+    away = np.flatnonzero(np.array(apart) > _CONFIG.moved_on)
+    back = np.flatnonzero(np.array(apart[away[0] :]) < _CONFIG.returned) if away.size else away
     if not back.size:
         return None
-    first = left[0] + int(back[0])
-    near = slice(first, first + _OVERLAP)
-    return float(1 + first + int(np.argmin(apart[near])))
+    first = int(away[0] + back[0])
+    return 1 + first + int(np.argmin(apart[first : first + _OVERLAP]))
