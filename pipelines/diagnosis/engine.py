@@ -183,6 +183,7 @@ def diagnose_prepared(
         change = np.abs(np.log(dataset.noise_power / power)).max()
         if change < _SETTLED and (usual is not None or len(found.causes) == known):
             break
+        found = replace(found, settled=len(found.causes) == known)
         del last  # its columns take the memory that the next ones need
         last, known = Look.of(dataset, columns(), named, config, found, usual), len(found.causes)
     last = replace(last, selection=last.selection.without_selected_alternatives)

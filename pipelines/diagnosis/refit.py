@@ -264,8 +264,8 @@ class Later:
         both = (self.rows.torque(one) for one in (model, replace(model, effects=effects)))
         return sum(price(a - b) for a, b in zip(*both, strict=True))
 
-    def possible(self, state: State, explained: float) -> bool:
-        """Return whether the last effect can be a cause with its numbers and their deviations.
+    def possible(self, state: State, explained: float | None = None, place: int = -1) -> bool:
+        """Return whether an effect can be a cause with its numbers and their deviations.
 
         An amplitude outside its range may be within it by its standard deviation, but not by the
         other sign, and one that surely is as slight as in any arm is no cause; a number of a shape
@@ -273,31 +273,36 @@ class Later:
         range, (distance / std)², may be a share of what the effect explains, for no law is exact.
 
         Args:
-            explained: cost that the effect saves.
+            explained: cost that the effect saves; None: (amplitude / std)², which it nearly is.
+            place: of the effect in the model; -1: the last.
         """
         slopes, names = self.slopes(state.model)
         factor, first = state.factor, self.base.width
         std = np.sqrt(factor.inverse_diagonal[first:]) / slopes.lengths
         step = factor.solve(state.slope)[first:] / slopes.lengths
+        one, place = state.model.effects[place], place % len(state.model.effects)
+        if explained is None:
+            at = [k for k, n in enumerate(names) if n[:2] == (1, place) and n[2].isdigit()]
+            sizes = np.array(one.amplitudes)[: len(at)]
+            explained = float(np.max((sizes / std[at]) ** 2, initial=0.0))
         deviations = np.sqrt(max(self.config.deviations**2, self.config.relevance * explained))
-        last, place = state.model.effects[-1], len(state.model.effects) - 1
-        within, timing = last.possible, self.rows.data.logs[0].motion.sample_time
-        if last.effect.parameters.reads_torque and self._mostly_acting(last.effect):
+        within, timing = one.possible, self.rows.data.logs[0].motion.sample_time
+        if one.effect.parameters.reads_torque and self._mostly_acting(one.effect):
             return False
         for (of_effect, which, name), by, reach in zip(names, step, deviations * std, strict=True):
             if not of_effect or which != place:
                 continue
             if not name.isdigit():
-                if abs(by) > reach and last.effect.at_end(name, float(by)):
+                if abs(by) > reach and one.effect.at_end(name, float(by)):
                     return False
                 continue
-            if abs(last.amplitudes[int(name)]) + reach < last.effect.parameters.slight(timing):
+            if abs(one.amplitudes[int(name)]) + reach < one.effect.parameters.slight(timing):
                 return False
             for way in np.outer((-reach, reach), _TRIED).ravel():
-                amplitudes = np.array(last.amplitudes)
+                amplitudes = np.array(one.amplitudes)
                 amplitudes[int(name)] += way
-                if amplitudes[int(name)] * last.amplitudes[int(name)] > 0.0:
-                    within |= last.effect.possible(last.effect.values(amplitudes))
+                if amplitudes[int(name)] * one.amplitudes[int(name)] > 0.0:
+                    within |= one.effect.possible(one.effect.values(amplitudes))
         return within
 
     def _mostly_acting(self, effect: Effect) -> bool:

@@ -86,6 +86,7 @@ class SearchStart:
     causes: tuple[Cause, ...]
     model: Exact
     rounds: tuple[Round, ...]  # in which a cause was selected
+    settled: bool = False  # an earlier search from these causes has chosen their laws
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,8 +140,12 @@ def select(
     start = state = later.start()
     causes, rounds, most = list[Cause](), list[Round](), later.config.causes
     if before is not None:
-        causes, rounds = list(before.causes), list(before.rounds)
-        state = _reformed(later, later.start(before.model))
+        kept: Sequence[int] = range(len(before.causes))
+        state = later.start(before.model)
+        if not before.settled:
+            kept, state = _reformed(later, state)
+        causes = [before.causes[k] for k in kept]
+        rounds = [one for one in before.rounds if one.cause in causes]
     cut = tuple[Key, ...]()
     while True:
         step = _Step(later.composed(state.model), start, state, baseline, causes)
@@ -515,21 +520,26 @@ def laws_of(later: Later, end: State, place: int) -> list[tuple[Named, float]]:
     return [(one, 1.0)]
 
 
-def _reformed(later: Later, state: State) -> State:
-    """Return the state with each lasting cause by the law of it that predicts best now."""
-    new = state
-    for _ in state.model.effects:
-        one, rest = new.model.effects[0], new.model.without(0)
-        before = later.fit(rest, new.theta, later.belief_of(rest))
+def _reformed(later: Later, state: State) -> tuple[Sequence[int], State]:
+    """Return each cause by the law of it that predicts best now, and which causes are kept.
+
+    One whose numbers are impossible beside causes that were found after it is none.
+    """
+    kept = list[int]()
+    for place in range(len(state.model.effects)):
+        one, rest = state.model.effects[0], state.model.without(0)
+        before = later.fit(rest, state.theta, later.belief_of(rest))
         same = _candidate(later, before, one.effect, np.array(one.amplitudes), log=one.log)
         if same is None or not same.possible:
-            return state
-        new = best_law(later, before, same).state
-    return new
+            state = before
+        else:
+            kept.append(place)
+            state = best_law(later, before, same).state  # the effect is the last one now
+    return kept, state
 
 
 def _backward(later: Later, causes: list[Cause], end: State) -> tuple[list[Cause], State]:
-    """Take out every cause without which the rest predicts as well.
+    """Take out every cause without which the rest predicts as well, with numbers that it can have.
 
     An event is kept: predictions of other times do not depend on it.
     """
@@ -541,7 +551,10 @@ def _backward(later: Later, causes: list[Cause], end: State) -> tuple[list[Cause
         model = end.model.without(place)
         without = later.fit(model, end.theta, later.belief_of(model))
         scores = {"with": _scores(later, end), "without": _scores(later, without)}
-        if "without" in confidence_set(scores, later.config):
+        lasting = [k for k, one in enumerate(model.effects) if one.log is None]
+        if "without" in confidence_set(scores, later.config) and all(
+            later.possible(without, place=k) for k in lasting
+        ):
             causes, end, place = [c for k, c in enumerate(causes) if k != place], without, 0
         else:
             place += 1
