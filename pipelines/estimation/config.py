@@ -213,7 +213,6 @@ class LinksConfig:
 class PreparationConfig:
     """When a joint is held or stands, and how wide a smoother of reversals is."""
 
-    still: float = 1e-3  # of the joint's largest speed: three decades below, it stands
     held: float = 0.02  # of its largest speed in all logs, below which a joint is held in a log
     # Times the bandwidth of a smoother. Over logs of the bench coupled transmission leaves 2.5
     # floors at 1, 1.2 at 1.8, 1.0 at 2.3, and hardly less at 3.2.

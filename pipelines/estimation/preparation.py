@@ -3,8 +3,8 @@
     prepared = prepare(logs, recipe, arm)
     prepared.data, prepared.judge, prepared.reference, prepared.columns
 
-Rests: a point-to-point motion stands for a fifth of its time, and dry friction bears whatever
-torque its controller commands there. Such rows do not count where no controller is known.
+A point-to-point motion stands for a fifth of its time, and dry friction bears whatever torque its
+controller commands there. Such rows do not count where no controller is known.
 
 Reversals: where a joint with dry friction F turns round, its acceleration jumps by 2 F/D. A
 smoother spreads this over its own time, so that friction, which follows the sign of the speed, is
@@ -15,17 +15,16 @@ wider.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import islice, pairwise
 
 import numpy as np
 
 from pipelines.dynamics.arm import Arm
 from pipelines.effects.base import FrictionLaw
 from pipelines.errors import InputRejected, NothingMatched
-from pipelines.estimation.config import EstimateConfig, PreparationConfig, RestConfig
+from pipelines.estimation.config import PreparationConfig
 from pipelines.estimation.estimate import (
     Recipe,
     equations_of,
@@ -35,16 +34,14 @@ from pipelines.estimation.estimate import (
     refuse_too_few,
     with_cutoff,
 )
-from pipelines.estimation.exact_model import Exact
 from pipelines.estimation.motion import Motions, Reconstructed, reconstruct
 from pipelines.estimation.nominal import nominal_columns, with_offsets
-from pipelines.estimation.nominal_fit import fit_nominal
 from pipelines.estimation.regression import Columns, cutoff_at
-from pipelines.estimation.rests import lasting, slowness
+from pipelines.estimation.rests import moving_rows
 from pipelines.estimation.rows import Data, gather
 from pipelines.estimation.state_estimation import design
 from pipelines.estimation.tuning import smoother_bandwidth
-from pipelines.io.log import Array, ExperimentLog, recording
+from pipelines.io.log import ExperimentLog, recording
 from pipelines.quality.segments import Mask
 
 _CONFIG = PreparationConfig()
@@ -127,45 +124,6 @@ class Prepared:
     fewer: tuple[FewerTerms, ...] = ()  # laws that were replaced by plainer ones
 
 
-def rests(motions: Motions, cutoff_hz: float | None, fastest: Array) -> list[Mask]:
-    """Return (samples, joints) of each log where a joint stands for a period of the low-pass.
-
-    And for another one to either side, over which the low-pass spreads what held it: at low speed
-    that would be a hump of friction. It may creep into a rest and out of it.
-
-    Args:
-        fastest: (joints,) [rad/s] largest speed in all logs.
-    """
-    found, sizes = [], slowness([one for _, one in motions])
-    for (log, one), size in zip(motions, sizes, strict=True):
-        least = 1.0 / ((cutoff_hz or np.inf) * log.sample_time)
-        # slow turns, which tell friction, do not stand
-        deep = np.abs(one.motion.dq[one.good.kept]) < _CONFIG.still * fastest
-        found.append(lasting(size < RestConfig.still, least, math.ceil(least), deep))
-    return found
-
-
-def sticking(every: Sequence[Data], moving: Sequence[Data], columns: Columns) -> Mask:
-    """Return the joints (joints,) whose rests leave more than twice what their motion does.
-
-    By the nominal model with an offset, fitted to their motion: what is there at rest and in motion
-    alike, of which an offset is the most, is no stiction.
-
-    Args:
-        every: rows of the fitted logs, and of others.
-        moving: the same rows, of which those at rest do not count.
-    """
-    model = Exact.start(*fit_nominal(moving[0], with_offsets(columns)))
-    power, count = np.zeros((2, every[0].n_joints)), np.zeros((2, every[0].n_joints))
-    for whole, part in zip(every, moving, strict=True):
-        left = np.square(whole.y - model.torque(whole))
-        for k, rows in enumerate((whole.counts & ~part.counts, part.counts)):
-            power[k] += np.bincount(whole.joint[rows], left[rows], whole.n_joints)
-            count[k] += np.bincount(whole.joint[rows], minlength=whole.n_joints)
-    rest, motion = power / np.maximum(count, 1.0)
-    return np.asarray((rest > RestConfig.more**2 * motion) & (count > 0.0).all(axis=0))
-
-
 def sharpened(motions: Motions, recipe: Recipe) -> Motions:
     """Return the logs with motions by wider smoothers, where these reach the cut-off.
 
@@ -235,57 +193,29 @@ def prepare(logs: Logs, recipe: Recipe, arm: Arm | None = None) -> Prepared:
 
 
 def _rows(parts: Sequence[Motions], columns: Columns, recipe: Recipe) -> list[Data | None]:
-    """Return the rows of fitted, judging and reference logs.
+    """Return the rows of fitted, judging and reference logs, None of a part without logs.
 
     Those do not count of a joint that is held, as it is throughout some logs: it sticks, and no law
     tells its torque; nor those at rest, where dry friction holds a joint and no controller is
     known.
     """
-    motions = [one for part in parts for one in part]
+    motions = tuple(one for part in parts for one in part)
     speeds = [np.abs(found.motion.dq[found.good.kept]) for _, found in motions]
     fastest = np.array([speed.max(axis=0, initial=0.0) for speed in speeds])
     held = list(fastest < _CONFIG.held * fastest.max(axis=0))
-    first = 0
-    for part in parts:
-        _refuse_held(part, held[first : first + len(part)], part is parts[0])
-        first += len(part)
-    rows = _all_rows(parts, columns, recipe, held)
+    bounds = list(pairwise(np.cumsum([0, *map(len, parts)]).tolist()))
+    for part, (first, last) in zip(parts, bounds, strict=True):
+        _refuse_held(part, held[first:last], first == 0)
     if any(log.controlled for log, _ in motions):  # with a known controller rests count
-        return rows
-    at_rest = rests(tuple(motions), recipe.cutoff_hz, fastest.max(axis=0))
-    if not any(own.any() for own in at_rest):
-        return rows
-    pairs = list(zip(held, at_rest, strict=True))
-    moving = _all_rows(parts, columns, recipe, [still | own for still, own in pairs])
-    data = moving[0]
-    assert data is not None
-    left = np.bincount(data.joint[data.counts], minlength=data.n_joints)
-    if (left < EstimateConfig.fewest_of_joint).any():
-        return rows
-    stuck = sticking([one for one in rows if one], [one for one in moving if one], columns)
-    if not stuck.any():
-        return rows
-    return _all_rows(parts, columns, recipe, [still | (own & stuck) for still, own in pairs])
-
-
-def _all_rows(
-    parts: Sequence[Motions], columns: Columns, recipe: Recipe, still: Sequence[Mask]
-) -> list[Data | None]:
-    """Return the rows of each part, None of one without logs.
-
-    Args:
-        still: (joints,) or (samples, joints) of each log whose rows do not count.
-    """
-    found, first = list[Data | None](), 0
-    for part in parts:
-        own = still[first : first + len(part)]
-        chosen = None
-        if any(mask.any() for mask in own):
-            pairs = zip(equations_of(part, recipe, columns), own, strict=True)
-            chosen = [replace(one.rows, slow=one.rows.slow | mask) for one, mask in pairs]
-        found.append(gather(part, columns, recipe, chosen, first) if part else None)
-        first += len(part)
-    return found
+        equations = equations_of(motions, recipe, columns)
+        pairs = zip(equations, held, strict=True)
+        rows = [replace(one.rows, slow=one.rows.slow | still) for one, still in pairs]
+    else:
+        rows = moving_rows(motions, len(parts[0]), with_offsets(columns), recipe, held=held)
+    return [
+        gather(part, columns, recipe, rows[first:last], first) if part else None
+        for part, (first, last) in zip(parts, bounds, strict=True)
+    ]
 
 
 def _refuse_held(motions: Motions, held: Sequence[Mask], fitted: bool) -> None:
