@@ -36,6 +36,7 @@ from pipelines.io.robot import RobotDescription
 from pipelines.io.sandbox import regular_file
 from pipelines.io.schema import Array
 from pipelines.quality.subject import many
+from pipelines.report.figures import joint_signal_figure
 from pipelines.report.report import Figure, Report, Section, Table
 from pipelines.stage import Inputs, Request, Stage, slug
 
@@ -220,7 +221,7 @@ def report(result: Result) -> Report:
     ]
     drawn = f"Drawn are the first {REPAIR.previews} of {n} logs; rrrid inspect draws more."
     text = (drawn,) if n > REPAIR.previews else ()
-    figures = tuple(_figure(item, item.preview) for item in logs if item.preview)
+    figures = tuple(f for item in logs if item.preview for f in _figures(item, item.preview))
     sections = [Section("Logs", text, tables=(Table(head, tuple(rows)),), figures=figures)]
     if tables:
         names = ("table", "from", "columns", "rows")
@@ -245,23 +246,15 @@ def report(result: Result) -> Report:
     return Report("Import", words, "attention" if said_any else "good", sections=tuple(sections))
 
 
-def _figure(item: ImportedLog, preview: Preview) -> Figure:
-    def numbers(*texts: str) -> Array:
-        return np.array([text.split() for text in texts], dtype=np.float64).T
+def _figures(item: ImportedLog, preview: Preview) -> tuple[Figure, Figure]:
+    def figure(name: str, texts: tuple[str, ...], unit: str) -> Figure:
+        values = np.array([text.split() for text in (preview.t, *texts)], dtype=np.float64).T
+        caption = f"{item.name}: {name} of each joint as it is in the log."
+        return joint_signal_figure(
+            f"{name}-{slug(item.name)}", caption, values[:, 0], values[:, 1:], f"{name} [{unit}]"
+        )
 
-    def draw(figure: Any) -> None:
-        from pipelines.report.figures import draw_joint_signals, joint_axes
-
-        t = numbers(preview.t)[:, 0]
-        signals = (("q", preview.q, "rad"), ("tau", preview.tau, "N m"))
-        for part, (name, texts, unit) in zip(figure.subfigures(1, 2), signals, strict=True):
-            axes = joint_axes(part, item.joints)
-            draw_joint_signals(axes, t, numbers(*texts), unit, quantity=name)
-
-    title = f"{item.name}: position and torque of each joint as they are in the log."
-    described = f"position and torque of log {item.name} against time"
-    size = (7.2, 0.7 + 1.1 * item.joints)
-    return Figure(f"import-{slug(item.name)}", title, draw, size, described)
+    return figure("position", preview.q, "rad"), figure("torque", preview.tau, "N m")
 
 
 def _checks(result: Result) -> tuple[Check, ...]:

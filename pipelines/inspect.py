@@ -31,13 +31,13 @@ from pipelines.io.schema import joint_unit
 from pipelines.quality.checks import NotTested, Subject, check_together, columns_first, findings
 from pipelines.quality.config import CONFIG
 from pipelines.quality.segments import quantum
-from pipelines.quality.subject import many
 from pipelines.quality.units import TRUSTED
 from pipelines.report.codes import first_to_read, title_of
 from pipelines.report.config import REPORT
+from pipelines.report.document import document
 from pipelines.report.log_preview import Preview, log_preview, preview_figures
-from pipelines.report.report import Report, Section, Table
-from pipelines.report.sections import boundary_card, checks_table, level_tone
+from pipelines.report.report import Report
+from pipelines.report.sections import checks_table, level_tone, with_card
 from pipelines.stage import Inputs, Request, Stage, Uses, read_logs
 
 _TRUST = "--trust-units"
@@ -268,100 +268,40 @@ def exit_code(result: Result, check: bool) -> int:
 def report(result: Result) -> Report:
     """Return the verdict, the findings, what was checked, and the signals of the first logs."""
     found = sorted((c for c in result.checks if c.level != "ok"), key=first_to_read)
-    more = len(found) - REPORT.findings
-    text = (f"{more} more are in result.json.",) if more > 0 else ()
-    table = checks_table(found[: REPORT.findings], as_given=True)
-    sections = [*boundary_card(result.boundary), Section("Findings", text, (table,))]
-    sections += [_logs_section(result), _passed_section(result), _not_tested_section(result)]
-    sections = [section for section in sections if any(table.rows for table in section.tables)]
-    previews = list(result.previews)
-    for log in result.logs:
-        if previews and previews[0].name == log.name:
-            sections.append(_log_section(log, previews.pop(0)))
     levels = Counter(check.level for check in result.checks)
-    rows = (
-        ("logs", len(result.logs) + len(result.rejected)),
-        ("checks made", len(result.checks)),
-        ("passed", levels["ok"]),
-        ("warnings", levels["warn"]),
-        ("repaired", levels["repair"]),
-        ("not usable", levels["reject"]),
-        ("not tested", len(result.not_tested)),
+    of_logs = Counter(log.verdict for log in result.logs)
+    told = [
+        (of_logs["reject"] + len(result.rejected), "cannot be used"),
+        (of_logs["repair"], "can be used after repair"),
+        (of_logs["warn"], "should be looked at"),
+    ]
+    passed = {check.code: check for check in reversed(result.checks) if check.level == "ok"}
+    times = Counter(check.code for check in result.checks if check.level == "ok")
+    untested = Counter((item.code, item.reason) for item in result.not_tested)
+    drawn = {preview.name: preview_figures(preview) for preview in result.previews}
+    page = document(
+        "inspect",
+        level_tone(levels),
+        result=result,
+        robots=len({log.robot for log in result.logs}),
+        found=found,
+        levels=levels,
+        told=[(count, words) for count, words in told if count],
+        most=REPORT.findings,
+        checks_table=checks_table,
+        level_tone=level_tone,
+        untested=len({code for code, _ in untested}),
+        passed=[
+            (check.message, times[code], f"{code} {title_of(code)}".strip())
+            for code, check in sorted(passed.items())
+        ],
+        untested_rows=[
+            (reason, count, f"{code} {title_of(code)}".strip())
+            for (code, reason), count in sorted(untested.items())
+        ],
+        drawn=[(log, drawn[log.name]) for log in result.logs if log.name in drawn],
     )
-    figures = Table(("what", "number"), rows)
-    verdict = _verdict(result, found)
-    return Report("Log doctor", verdict, level_tone(levels), figures, tuple(sections))
-
-
-def _verdict(result: Result, found: list[Check]) -> str:
-    total = len(result.logs) + len(result.rejected)
-    robots = len({log.robot for log in result.logs})
-    logs = f"{total} logs of {robots} robots" if robots > 1 else f"{total} logs"
-    if not found:
-        which = "The log is" if total == 1 else f"All {logs} are"
-        untested = len({item.code for item in result.not_tested})
-        more = f" {many(untested, 'check')} could not be made on every log; the report says why."
-        words = f"{which} in order: nothing was found that a fit would suffer from."
-        return words + more * bool(untested)
-    levels = Counter(log.verdict for log in result.logs)
-    counts = {"cannot be used": levels["reject"] + len(result.rejected)}
-    counts |= {"can be used after repair": levels["repair"], "should be looked at": levels["warn"]}
-    told = [words for words, count in counts.items() if count]
-    if total == 1:
-        verdict = f"The log {told[0] if told else 'is not bad in itself'}"
-    else:
-        each = ", ".join(f"{counts[words]} {words}" for words in told)
-        verdict = f"Of {logs} {each or 'none is bad alone'}"
-    return f"{verdict}. First of all: {found[0].message}."
-
-
-def _passed_section(result: Result) -> Section:
-    first: dict[str, Check] = {}
-    counts = Counter(check.code for check in result.checks if check.level == "ok")
-    for check in result.checks:
-        if check.level == "ok":
-            first.setdefault(check.code, check)
-    rows = tuple(
-        (check.message, counts[code], f"{code} {title_of(code)}".strip())
-        for code, check in sorted(first.items())
-    )
-    columns = ("what was measured, in the first of them", "logs", "code")
-    return Section("What was looked at and is in order", (), (Table(columns, rows),))
-
-
-def _not_tested_section(result: Result) -> Section:
-    counts = Counter((item.code, item.reason) for item in result.not_tested)
-    rows = tuple(
-        (reason, count, f"{code} {title_of(code)}".strip())
-        for (code, reason), count in sorted(counts.items())
-    )
-    text = ("Neither passed nor failed: these logs give nothing to judge by.",)
-    return Section("Not tested, and why", text, (Table(("why", "logs", "code"), rows),))
-
-
-def _logs_section(result: Result) -> Section:
-    several = len({log.robot for log in result.logs}) > 1
-    columns = ("name", "robot", "experiment", "role", "joints", "samples", "duration [s]")
-    rows = []
-    for log in result.logs:
-        joint = "" if log.moving_joint is None else f", joint {log.moving_joint}"
-        kind, rate = f"{log.experiment}{joint}", 1.0 / log.sample_time
-        row = (log.name, log.robot if several else "", kind, log.role, log.joints, log.samples)
-        rows.append((*row, log.duration, rate, log.integrity))
-    tones = tuple(level_tone([log.verdict]) for log in result.logs)
-    table = Table((*columns, "rate [Hz]", "integrity"), tuple(rows), tones=tones)
-    return Section("The logs", (), (table,))
-
-
-def _log_section(log: LogSummary, preview: Preview) -> Section:
-    rows = tuple((r.signal, r.joint, r.low, r.high, r.unit) for r in log.ranges)
-    tables = (Table(("signal", "joint", "lowest", "highest", "unit"), rows),) if rows else ()
-    uneven = log.jitter > REPORT.visible_jitter or log.dropped_samples > 0 or bool(log.gaps)
-    steps = ("not visible" if step is None else f"{step:.3g}" for step in log.encoder_step)
-    text = f"{log.usable_samples} of {log.samples} samples can be used. Encoder steps [rad]: "
-    # a hyphen and a blank at which no line is broken
-    text += f"{', '.join(steps)}. SHA\u2011256\u00a0{log.sha256[:16]}…"
-    return Section(f"Log {log.name}", (text,), tables, preview_figures(preview, uneven))
+    return with_card(page, result.boundary)
 
 
 def _onward(result: Result, inputs: Inputs) -> Inputs:

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from pipelines.inspect import Result as Examination
     from pipelines.io.log import ExperimentLog
     from pipelines.reconstruct import Result as Motion
+    from pipelines.report.report import Figure as Drawing
     from pipelines.simulate import Result as Simulation
     from pipelines.stage import Answer as Found
     from pipelines.validate_writing import Result as Validation
@@ -109,7 +110,12 @@ class Answer(Generic[R]):
     @property
     def figures(self) -> tuple[str, ...]:
         """Names of the figures of the report, for `plot`."""
-        return tuple(one.name for section in self.found.report.sections for one in section.figures)
+        return tuple(one.name for one in self._drawings())
+
+    def _drawings(self) -> list[Drawing]:
+        from pipelines.report.report import figures_in
+
+        return list(figures_in(self.found.report.sections))
 
     def to_frame(self, rows: str = "") -> pandas.DataFrame:
         """Return the rows of the result as a table, a column a number or text.
@@ -142,8 +148,7 @@ class Answer(Generic[R]):
         """
         from matplotlib.figure import Figure
 
-        every = [one for section in self.found.report.sections for one in section.figures]
-        for one in every:
+        for one in self._drawings():
             if name in ("", one.name):
                 drawing = Figure(figsize=one.size, layout="constrained")
                 one.draw(drawing)

@@ -11,13 +11,10 @@ from pipelines.dynamics.body import Array
 from pipelines.export.target import Cause
 from pipelines.io.model_file import Validity
 from pipelines.io.results import NOT_STORED
-from pipelines.report.report import Cell, Report, Section, Table, Tone, columns_table
-from pipelines.report.sentences import paragraphs, sentence
-from pipelines.report.style import format_number
+from pipelines.report.document import document
+from pipelines.report.report import Cell, Report, Table, columns_table
 
 __all__ = ["Card", "Consistency", "LinkValue", "Proof", "Replay", "card"]
-
-_RANGES = {"speed": "rad/s", "acceleration": "rad/s^2", "posture": "rad", "temperature": "degC"}
 
 
 @dataclass(frozen=True)
@@ -100,68 +97,37 @@ class Card:
 
 def card(result: Card) -> Report:
     """Return the card: terms, proof, links, validity."""
-    good = (
-        not result.consistency.conflicts and result.proof is not None and not result.count("lost")
-    )
-    sections = [
-        Section("Terms", paragraphs("export", "causes", result), (_causes(result),)),
-        Section("Proof", paragraphs("export", "proof", result), _proof(result)),
-        Section("Links", paragraphs("export", "links", result), (_links(result),)),
-        Section("Validity", paragraphs("export", "validity"), (_validity(result),)),
-    ]
-    if result.notes:
-        sections.append(Section("Differences from the description", result.notes))
+    proved = result.proof is not None and not result.count("lost")
     worst = None
     if result.torque_error is not None:
         worst = float(np.max(result.torque_error / np.maximum(result.torque_rms, 1e-300)))
-    verdict = sentence("export", "verdict", result, worst)
-    tone: Tone = "good" if good else "attention"
-    basis = (f"model: {result.source}",) if result.source else ()
-    return Report("Export", verdict, tone, sections=tuple(sections), basis=basis)
+    return document(
+        "export",
+        "good" if proved and not result.consistency.conflicts else "attention",
+        card=result,
+        worst=worst,
+        unit=" or ".join(dict.fromkeys(result.units)),
+        proof=_proof(result),
+    )
 
 
-def _causes(result: Card) -> Table:
-    rows: list[tuple[Cell, ...]] = []
-    for cause in result.causes:
-        cost = None if cause.cost is None else float(np.max(cause.cost))
-        share = None if cause.share is None else 100.0 * cause.share
-        rows.append((cause.place, cause.carried, cause.how, cost, share))
-    unit = " or ".join(dict.fromkeys(result.units))
-    error = f"torque error rms [{unit}]"
-    columns = "term", "carried", "how", error, "of the largest torque [%]"
-    return Table(columns, tuple(rows), keeps_empty=True)
-
-
-def _proof(result: Card) -> tuple[Table, ...]:
+def _proof(result: Card) -> list[tuple[Table, str]]:
+    """Return the tables of the proof with their captions: on a motion, and on replayed logs."""
     shown = {"torque rms": result.torque_rms, "error of the file": result.torque_error}
     caption = f"Torque of the model on {result.motion}, and how far the file is off [N m]."
-    tables = [_by_joint(result.joints, shown, caption)]
+    tables = [(_by_joint(result.joints, shown), caption)]
     for one in result.replays:
         shown = {"measured, rms": one.torque_rms, "error of the model": one.model_error}
         shown["error of the file"] = one.export_error
-        tables.append(_by_joint(result.joints, shown, f"The log {one.name}, replayed [N m]."))
+        tables.append((_by_joint(result.joints, shown), f"The log {one.name}, replayed [N m]."))
         if one.export_position_error is not None:
             shown = {"simulated by the model": one.model_position_error}
             shown["simulated by the target"] = one.export_position_error
             caption = f"Position error of {one.name}, in windows of 0.1 s under its torque [rad]."
-            tables.append(_by_joint(result.joints, shown, caption))
-    return tuple(tables)
+            tables.append((_by_joint(result.joints, shown), caption))
+    return tables
 
 
-def _by_joint(joints: Sequence[Cell], shown: Mapping[str, Array | None], caption: str) -> Table:
+def _by_joint(joints: Sequence[Cell], shown: Mapping[str, Array | None]) -> Table:
     cells = {name: values.tolist() for name, values in shown.items() if values is not None}
-    return columns_table({"joint": joints, **cells}, caption)
-
-
-def _links(result: Card) -> Table:
-    rows = tuple((x.joint, x.name, x.value, x.std, x.unit, x.origin) for x in result.links)
-    return Table(("joint", "parameter", "value", "std", "unit", "from"), rows)
-
-
-def _validity(result: Card) -> Table:
-    rows: list[tuple[Cell, ...]] = []
-    for key, unit in _RANGES.items():
-        ranges = getattr(result.validity, key, None) or (None,) * len(result.joints)
-        words = (" to ".join(map(format_number, r)) if r is not None else None for r in ranges)
-        rows.append((f"{key} [{unit}]", *words))
-    return Table(("range of the logs", *result.joints), tuple(rows), keeps_empty=True)
+    return columns_table({"joint": joints, **cells})

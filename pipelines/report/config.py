@@ -13,7 +13,6 @@ class ReportConfig:
 
     previews: int = 8  # logs whose signals `inspect` draws
     findings: int = 200  # that `inspect` lists
-    visible_jitter: float = 1e-3  # rms, in sample times, from which intervals are drawn
     reconstructed: int = 8  # logs whose motion is drawn
     simulated: int = 4  # logs whose simulation is drawn
     inputs: int = 40  # at the foot of a page
@@ -25,9 +24,6 @@ class ReportConfig:
     above_noise: float = 10.0  # times the noise between periods, from which the model lacks terms
     outstanding: float = 2.0  # times the relative error of all joints, from which one is named
     own_share: float = 2.0  # times the share of all joints, from which that of one joint is given
-    # of the binned residual, left by a finding that it follows, and that it follows in part
-    followed: float = 0.3
-    partly_followed: float = 0.8
     coherent: float = 0.5  # coherence of measured points of a response that are drawn
     scaled_by: float = 0.3  # coherence of the points that set the scale of its axis
     method_off: float = 0.03  # relative, beyond noise, from which the report calls a method off
@@ -39,7 +35,6 @@ class ReportConfig:
     alike: float = 0.8  # similarity from which two causes explain the same
     much: float = 0.01  # relative change of a motion, that belongs into the verdict
     drawn_limit: float = 0.6  # of a limit, from which on the limit is drawn beside the signal
-    felt: float = 0.5  # of the rest of an error, from which further effects have a column
     fault_numbers: int = 3  # of a finding that `demo` tells, where it hid another
 
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -14,42 +12,28 @@ from pipelines.diagnosis.result import (
     DetectionLimit,
     Diagnosis,
     Extension,
-    Rejected,
+    Finding,
+    Gain,
     ResidualRms,
     Result,
     Trial,
-    Value,
 )
-from pipelines.effects import find_effect
+from pipelines.effects import effect_names, find_effect
 from pipelines.estimation.nominal import within
-from pipelines.io.log import Array
-from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section
-from pipelines.report.diagnosis_picture import picture_sections
-from pipelines.report.finding_words import headlines
-from pipelines.report.report import Report, Section, Table, Tone
-from pipelines.report.sections import boundary_card, data_quality
-from pipelines.report.sentences import as_sentence, paragraphs, sentence
-from pipelines.report.style import format_number, format_unit, three_digits, to_one_place
-from pipelines.report.words import (
-    Units,
-    format_value,
-    format_values,
-    in_order,
-    is_cause,
-    laws_words,
-    named,
-    spoken,
-    threshold_words,
-    title_of,
-    together,
-    unit_or_dash,
-    units_in,
-    without_keys,
-)
+from pipelines.report import words
+from pipelines.report.config import REPORT
+from pipelines.report.diagnosis_figures import evidence_figures, finding_figures
+from pipelines.report.document import capital, document, sentence
+from pipelines.report.finding_words import beyond_chance, headlines, of_any_size, where
+from pipelines.report.report import Report, Table, Tone, columns_table
+from pipelines.report.sections import checks_table, with_card
+from pipelines.report.style import format_number, format_unit
+from pipelines.report.words import Units, named, title_of, together, units_in
 
 _CANDIDATES = 40  # numerics: lines
+_OPEN = 3  # numerics: findings that are not folded
 _IN_RUN = "--set diagnose.model=FILE"
-_NEAR = 5  # numerics: explanations that are named where none is found
+_NO_TIP = 1e-9  # numerics: [m] no tip: nothing that is simulated and measured comes so near
 _TONES: dict[str, Tone] = {
     "no-fault-found": "good",
     "cause": "bad",
@@ -58,7 +42,7 @@ _TONES: dict[str, Tone] = {
 }
 # What of a cause's shape a technician can use; the rest is the form of its law.
 _AT = {
-    "order": "{size} waves {per}",
+    "order": "order {size}",
     "from_joint": "from joint {size}",
     "with_joint": "with joint {size}",
     "link": "of link {size}",
@@ -71,36 +55,139 @@ _AT = {
     "limit": "at {size} {unit}",
 }
 
-_say, _paragraphs = partial(sentence, "diagnosis"), partial(paragraphs, "diagnosis")
-
 
 def diagnosis_report(result: Result) -> Report:
     """Verdict, key figures, findings with their proof, evidence, limits."""
-    units, nominal, after = units_in(result), result.residual_rms, result.after_rms
-    sections = []
+    units, left = units_in(result), result.after_rms.validate
+    lasting = [one for one in result.findings if find_effect(one.cause).clock != "log"]
+    findings = []
     for number, one in enumerate(result.findings, 1):
-        found = finding_section(
-            number, one, nominal, units=units, beside=result.findings, left=after.validate
-        )
-        sections += [found, numbers_section(number, one, units, result.findings)]
-    sections += _unknown(result)
-    more = picture_sections(result, result.rated, units, floor_words(result))
-    more += [*_baseline(result), *_rejected(result), *_candidates(result)]
-    more += [*_limits(result), _basis(result), *data_quality(result.data_quality)]
-    sections += [*boundary_card(result.boundary), *(replace(one, folded=True) for one in more)]
-    name = "noise of the residual" if _is_noise(result) else "left by reference logs"
-    errors = torque_errors(
-        nominal, after, result.rated, nominal.noise_floor, name, floor_words(result), units
+        told = finding_context(number, one, result.residual_rms, units, left)
+        told["folded"] = number > _OPEN or not (beyond_chance(one) or number == 1)
+        told["command"] = command([one]) if find_effect(one.cause).clock != "log" else ""
+        told["every"] = command(lasting) if len(lasting) > 1 else ""
+        findings.append(told)
+    said = " ".join(lines := headlines(result))
+    causes = together(result.findings)
+    advice = [(what, find_effect(cause).words.remedy) for cause, what in causes]
+    report = document(
+        "diagnosis",
+        _tone(result),
+        result=result,
+        words=words,
+        lines=[words.without_keys(line) for line in lines],
+        left_out=[within(title_of(cause)) for cause in result.without if _may_be_wrong(cause)],
+        advice=[(what, remedy) for what, remedy in advice if remedy.split(";")[0] not in said],
+        errors=torque_errors(result, units),
+        findings=findings,
+        checks_table=checks_table,
+        laws=sentence("laws", result.laws_of, _IN_RUN, words.fewer_words(result.fewer_terms)),
+        judged=sentence("held_out", result.held_out),
+        origins=sorted({one.origin for one in result.thresholds}),
+        to_record=_to_record(result),
+        near=_nearest(result.candidate_causes),
+        rejected=_by_reason(result),
+        candidates=_candidates(result),
+        limits=detection_limits(result.detection_limits, len(result.residual_rms.identify)),
+        thresholds=_thresholds(result),
+        evidence=[(one, evidence_figures(one, k, units)) for k, one in enumerate(result.evidence)],
+        above_floor=above_floor,
+        rated=result.rated,
+        units=units,
     )
-    title = f"Diagnosis of {result.robot}" if result.robot else "Diagnosis"
-    judged = _say("held_out", result.held_out)
-    basis = (
-        laws_words(result.laws_of, _IN_RUN, result.fewer_terms),
-        judged,
-        threshold_words(result),
+    return with_card(report, result.boundary, first=result.verdict != "cause")
+
+
+def extension_report(result: Extension) -> Report:
+    """Verdict, key figures, the causes, what was refused."""
+    units, before = units_in(result), result.residual_rms
+    findings = [
+        finding_context(number, one, before, units) | {"folded": False, "command": "", "every": ""}
+        for number, one in enumerate(result.findings, 1)
+    ]
+    loads = [one for one in result.findings if one.origin == "base parameters"]
+    reason = result.rejected[0].reason if result.rejected else "no cause was named"
+    tone: Tone = "good" if result.accepted else "attention" if result.findings else "bad"
+    return document(
+        "extension",
+        tone,
+        result=result,
+        words=words,
+        errors=torque_errors(result, units),
+        found=[what for _, what in together(result.findings)],
+        refused=[what for _, what in together(result.rejected)],
+        reason=words.without_keys(reason),
+        load=named(loads[0].cause, loads[0].joint) if loads else "",
+        findings=findings,
+        laws=sentence("laws", result.laws_of, "", words.fewer_words(result.fewer_terms)),
+        judged=sentence("held_out", result.held_out),
+        checks_table=checks_table,
+        units=units,
     )
-    shown, advice = tuple(sections), _advice(result)
-    return Report(title, _verdict(result), _tone(result), errors, shown, advice, basis)
+
+
+def finding_context(
+    number: int, one: Finding, nominal: ResidualRms, units: Units, left: np.ndarray | None = None
+) -> dict[str, object]:
+    """Return what the template says of a finding.
+
+    Args:
+        nominal: residual of the model without any finding, and the floor of the held-out logs.
+        left: (joints,) held-out torque error with all findings.
+    """
+    torque = one.gain.validate_torque_rms
+    grown = torque.after - torque.before
+    stays = grown if left is None else left - torque.before
+    # more than the interval is wide, and not taken away again by another finding
+    larger = (torque.ci95[:, 0] > 0.0) & (stays > grown - torque.ci95[:, 0])
+    rest = np.nanmax(nominal.identify) if one.joint is None else nominal.identify[one.joint - 1]
+    rival = next(iter(one.alternatives), None)
+    share = _own_share(one, nominal)
+    return {
+        "one": one,
+        "place": where(one),
+        "texts": find_effect(one.cause).words,
+        "share": share if share > REPORT.own_share * one.explained else None,
+        "any_size": of_any_size(one),
+        "torque": "" if not math.isfinite(one.torque_rms)
+        else f"{format_number(one.torque_rms, 2)} {units.at(one.joint).torque}",
+        "imitated": one.torque_rms**2 > 2.0 * rest**2,
+        "larger": [(j + 1, torque.before[j], torque.after[j]) for j in np.flatnonzero(larger)],
+        "tip": tip_errors(one.gain),
+        "sure": beyond_chance(one),
+        "pair": "" if rival is None
+        else f"{words.cause_at(one.cause, one.joint)} {words.cause_at(rival.cause, rival.joint)}",
+        "figures": finding_figures(number, one, units),
+    }  # fmt: skip
+
+
+def command(some: Sequence[Finding]) -> str:
+    """How to extend the model by these findings."""
+    causes = dict.fromkeys(words.cause_at(one.cause, one.joint) for one in some)
+    return f'"rrrid extend LOGS {" ".join(f"--with {cause}" for cause in causes)}"'
+
+
+def tip_errors(gain: Gain) -> tuple[str, str] | None:
+    """[mm] simulated tip error before and after, as printed; None where no tip was simulated."""
+    tip = gain.tip_error_rms
+    if tip is None or max(tip.before, tip.after) < _NO_TIP:
+        return None
+    return format_number(1e3 * tip.before, 3), format_number(1e3 * tip.after, 3)
+
+
+def _own_share(one: Finding, nominal: ResidualRms) -> float:
+    """Of the held-out power that its joint has above the floor; NaN where it has none."""
+    if one.joint is None or one.origin == "base parameters" or len(nominal.identify) == 1:
+        return math.nan
+    torque = one.gain.validate_torque_rms
+    powers = (torque.before, torque.after, nominal.validate, nominal.noise_floor)
+    before, after, whole, floor = (float(x[one.joint - 1]) ** 2 for x in powers)
+    return min(1.0, max(0.0, (before - after) / (whole - floor))) if whole > floor else math.nan
+
+
+def _may_be_wrong(cause: str) -> bool:
+    """Return whether a cause is no friction law that any nominal model may have."""
+    return cause in effect_names() and find_effect(cause).evidence != "none"
 
 
 def _tone(result: Result) -> Tone:
@@ -113,274 +200,142 @@ def _tone(result: Result) -> Tone:
     return _TONES[result.verdict]
 
 
-def _verdict(result: Result) -> str:
-    """A line for each cause, and one for causes that were not looked for."""
-    lines = [without_keys(line) for line in headlines(result)]
-    without = dict.fromkeys(within(title_of(c)) for c in result.without if is_cause(c))
-    if without:
-        lines.append(f"Not looked for, because you said so: {', '.join(without)}.")
-    return "\n".join(lines)
-
-
-def _advice(result: Result) -> tuple[str, ...]:
-    """Return what to check on the machine, of causes whose line has no room for it."""
-    said = " ".join(headlines(result))
-    several = len(result.findings) > 1
-    return tuple(
-        f"What to check{f' for {words}' if several else ''}: {as_sentence(remedy)}"
-        for cause, words in together(result.findings)
-        if (remedy := find_effect(cause).words.remedy).split(";")[0] not in said
-    )
-
-
-def _is_noise(found: Diagnosis) -> bool:
-    """Return whether the floor is noise of the residual: there are no reference logs."""
-    return found.noise_floor_origin != "reference logs"
-
-
-def floor_words(found: Diagnosis) -> str:
-    """Return where the noise floor comes from."""
-    return _say("floor", found.noise_floor_origin)
-
-
-def torque_errors(
-    before: ResidualRms,
-    after: ResidualRms,
-    rated: Sequence[float],
-    floor: Array,
-    name: str,
-    words: str,
-    units: Units = Units(),  # noqa: B008
-) -> Table:
+def torque_errors(result: Result | Extension, units: Units) -> Table:
     """Return the held-out torque error of each joint before and after, beside the noise floor.
 
     Where nothing extends the model there is no column of the extended one.
-
-    Args:
-        floor: (joints,) [N m]; `name`: what it is called; `words`: where it comes from.
     """
-    extended = not np.array_equal(before.validate, after.validate, equal_nan=True)
-    errors = [before.validate, after.validate] if extended else [before.validate]
-    joints = len(floor)
-    limits = [x if math.isfinite(x) else math.nan for x in [*rated, *[math.nan] * joints][:joints]]
-    shares = to_one_place(
-        [100.0 * float(x) / y for e in errors for x, y in zip(e, limits, strict=True)]
-    )
-    torques = to_one_place([float(x) for values in (*errors, floor) for x in values])
-    rows = tuple((j + 1, *torques[j::joints], *shares[j::joints]) for j in range(joints))
-    unit = units.torque
-    heads: tuple[str, ...] = (f"torque error [{unit}]", f"{name} [{unit}]", "error [% of rated]")
+    before, after = result.residual_rms.validate, result.after_rms.validate
+    extended = not np.array_equal(before, after, equal_nan=True)
+    floor, unit = result.residual_rms.noise_floor, units.torque
+    rated = np.full(len(floor), math.nan)
+    rated[: len(result.rated)] = result.rated[: len(floor)]
+    rated[np.isinf(rated)] = math.nan
+    columns: dict[str, Iterable[float | int]] = {"joint": range(1, len(floor) + 1)}
+    columns[f"torque error{' now' * extended} [{unit}]"] = before.tolist()
     if extended:
-        heads = (f"torque error now [{unit}]", f"extended [{unit}]", f"{name} [{unit}]")
-        heads += ("now [% of rated]", "extended [% of rated]")
-    return Table(("joint", *heads), rows, f"Held out, root mean square. {words}".strip())
+        columns[f"extended [{unit}]"] = after.tolist()
+    columns[f"noise floor [{unit}]"] = floor.tolist()
+    columns[f"{'now' if extended else 'error'} [% of rated]"] = (100.0 * before / rated).tolist()
+    if extended:
+        columns["extended [% of rated]"] = (100.0 * after / rated).tolist()
+    return columns_table(columns)
+
+
+def _to_record(result: Result) -> list[tuple[str, str]]:
+    """Return what shows causes that these logs cannot: (recording, causes)."""
+    wanted: dict[str, list[tuple[str, str]]] = {}
+    for one in result.not_identifiable:
+        wanted.setdefault(one.record, []).append((one.cause, str(one.joint or "")))
+    return [
+        (
+            words.without_keys(record),
+            capital("; ".join(what for _, what in words.at_places(places))),
+        )
+        for record, places in wanted.items()
+    ]
+
+
+def _nearest(trials: Iterable[Trial], most: int = 5) -> list[tuple[str, float]]:
+    """Return the largest gain of each cause; to first order where it was not fitted."""
+    found: dict[str, float] = {}
+    for t in trials:
+        place, gain = named(t.cause, t.joint), t.exact_gain
+        gain = gain if math.isfinite(gain) else t.gain
+        found[place] = max(gain, found.get(place, 0.0))
+    return sorted(found.items(), key=lambda item: -item[1])[:most]
+
+
+def _by_reason(result: Result) -> list[tuple[str, str]]:
+    """All rejected causes of a reason in a line, those that are only weaker last."""
+    reasons = dict.fromkeys(one.reason for one in result.rejected)
+    rows = []
+    for reason in sorted(reasons, key=lambda reason: reason == WEAKER):
+        causes = together(one for one in result.rejected if one.reason == reason)
+        rows.append(("; ".join(what for _, what in causes), words.without_keys(reason)))
+    return rows
 
 
 def _percent(x: float) -> float | None:
     return round(100.0 * x, 2) if math.isfinite(x) else None
 
 
-def _reachable(threshold: float) -> float | None:
-    """[%] a threshold, where anything could exceed it: no gain is more than all the residual."""
-    return _percent(threshold) if threshold <= 1.0 else None
-
-
-def _unknown(result: Result) -> list[Section]:
-    """The nearest explanations, and which signals the residual goes with, where none is named."""
-    if result.verdict != "unknown":
-        return []
-    gains = sorted(_nearest(result.candidate_causes).items(), key=lambda item: -item[1])[:_NEAR]
-    near = [(named(*place), gain) for place, gain in gains]
-    joint, curves = 0, []
-    if result.evidence:
-        one = result.evidence[0]
-        joint = int(np.argmax(np.nan_to_num(one.above_noise_floor))) + 1
-        own = [c for c in one.curves if c.joint == joint]
-        curves = sorted(own, key=lambda c: -c.explained)[:3]
-    text = _paragraphs("unknown", without_keys(result.reason), near, joint, curves)
-    return [Section("Why there is no name", text)]
-
-
-def _nearest(candidates: Iterable[Trial]) -> dict[tuple[str, int | None], float]:
-    """Return the largest gain of each cause; to first order where it was not fitted."""
-    found: dict[tuple[str, int | None], float] = {}
-    for t in candidates:
-        gain = t.exact_gain if math.isfinite(t.exact_gain) else t.gain
-        if gain > found.get((t.cause, t.joint), 0.0):
-            found[t.cause, t.joint] = gain
-    return found
-
-
-def _baseline(result: Result) -> list[Section]:
-    if not result.baseline_effects:
-        return []
-    rows = []
-    for one in result.baseline_effects:
-        parameters = format_values(in_order(one.cause, one.parameters))
-        share = three_digits(100.0 * one.explained)
-        rows.append((title_of(one.cause), one.joint, parameters, share))
-    table = Table(("effect", "joint", "parameters", "explains [%]"), tuple(rows))
-    text = "The reference logs show them as well; the extended model has them."
-    return [Section("Baseline effects", (text,), (table,))]
-
-
-def _rejected(result: Result) -> list[Section]:
-    """A line for each reason with all causes it holds for, those that are only weaker last."""
-    rejected: Sequence[Rejected] = result.rejected
-    if not rejected:
-        return []
-    reasons = sorted({one.reason: None for one in rejected}, key=lambda reason: reason == WEAKER)
-    rows = []
-    for reason in reasons:
-        causes = together(one for one in rejected if one.reason == reason)
-        rows.append(("; ".join(words for _, words in causes), without_keys(reason)))
-    weaker = sum(one.reason == WEAKER for one in rejected)
-    text = _paragraphs("rejected", weaker, len(rejected) - weaker, WEAKER)
-    return [Section("Rejected", text, (Table(("causes", "why"), tuple(rows)),))]
-
-
-def _candidates(result: Result) -> list[Section]:
+def _candidates(result: Result) -> list[tuple[object, ...]]:
     """Those that were fitted, and of the others the best."""
-    everything = result.candidate_causes
-    shown = [t for t in everything if t.accepted or math.isfinite(t.exact_gain)]
-    others = sorted((t for t in everything if t not in shown), key=lambda t: -t.gain)
-    shown = [*shown, *others[: max(0, _CANDIDATES - len(shown))]]
-    if not shown:
-        return []
-    rows = []
-    for t in sorted(shown[:_CANDIDATES], key=lambda t: (t.step, -t.gain)):
-        gains = (_percent(t.gain), _reachable(t.threshold), _percent(t.exact_gain))
-        rows.append((t.step, title_of(t.cause), t.joint, *gains, _outcome(t, result)))
-    tones: tuple[Tone, ...] = tuple("good" if r[-1] == "accepted" else "neutral" for r in rows)
-    more = len(everything) - len(rows)
-    text = (f"{more} more, all weaker, are in result.json.",) if more > 0 else ()
-    columns: tuple[str, ...] = ("search", "cause", "joint", "gain in square [%]", "threshold [%]")
-    columns += ("gain in square, fitted exactly [%]", "outcome")
-    caption = _say("candidates", len(result.residual_rms.identify))
-    return [Section("Candidate causes", text, (Table(columns, tuple(rows), caption, tones),))]
-
-
-def _outcome(trial: Trial, result: Result) -> str:
-    """A cause that the search took is not named for that: held-out time decides."""
-    if not trial.accepted:
-        return without_keys(trial.reason)
-    is_named = any((f.cause, f.joint) == (trial.cause, trial.joint) for f in result.findings)
-    return "accepted" if is_named else "fitted by the search, not named"
-
-
-def _basis(result: Result) -> Section:
-    """Where floor and thresholds come from, and what judged."""
-    text = (
-        laws_words(result.laws_of, _IN_RUN, result.fewer_terms),
-        floor_words(result),
-        _say("held_out", result.held_out),
-        threshold_words(result),
+    every = sorted(
+        result.candidate_causes,
+        key=lambda t: (not (t.accepted or math.isfinite(t.exact_gain)), -t.gain),
     )
-    best = {(t.cause, t.joint): t.gain for t in result.thresholds if math.isfinite(t.gain)}
-    ordered = sorted(best.items(), key=lambda item: (item[0][0], item[0][1] or 0))
-    rows = tuple((title_of(cause), joint, _reachable(gain)) for (cause, joint), gain in ordered)
-    columns = ("cause", "joint", "share of the squared residual to exceed [%]")
-    caption = f"Thresholds of what these logs can show. {_say('out_of_reach')}"
-    return Section("What this rests on", text, (Table(columns, rows, caption),) if rows else ())
+    causes = {(one.cause, one.joint) for one in result.findings}
+    rows: list[tuple[object, ...]] = []
+    for t in sorted(every[:_CANDIDATES], key=lambda t: (t.step, -t.gain)):
+        outcome = words.without_keys(t.reason)
+        if t.accepted:  # held-out time decides whether it is named
+            taken = (t.cause, t.joint) in causes
+            outcome = "accepted" if taken else "fitted by the search, not named"
+        threshold = _percent(t.threshold) if t.threshold <= 1.0 else None
+        gains = (_percent(t.gain), threshold, _percent(t.exact_gain))
+        rows.append((t.step, title_of(t.cause), t.joint, *gains, outcome))
+    return rows
 
 
-def _limits(result: Diagnosis) -> list[Section]:
-    """The smallest of each cause that would have been found, and what to record for the others."""
-    sections = []
-    if result.detection_limits:
-        rows = tuple(
-            (title_of(one.cause), one.joint, spoken(one.parameter), *_smallest(one))
-            for one in result.detection_limits
-        )
-        table = Table(("cause", "joint", "parameter", "smallest", "unit", "at"), rows)
-        sections.append(Section("Detection limits", _paragraphs("limits"), (table,)))
-    if result.not_identifiable:
-        hidden = tuple(
-            (title_of(one.cause), one.joint, without_keys(one.reason), without_keys(one.record))
-            for one in result.not_identifiable
-        )
-        table = Table(("cause", "joint", "why", "what to record"), hidden)
-        text = ("Neither found nor excluded.",)
-        sections.append(Section("What these logs cannot tell", text, (table,)))
-    if result.without_limit:
-        rest = tuple((title_of(o.cause), without_keys(o.reason)) for o in result.without_limit)
-        table = Table(("cause", "what is known of it"), rest)
-        text = ("Of these no smallest size that would have been found is known.",)
-        sections.append(Section("No detection limit available", text, (table,)))
-    return sections
+def _thresholds(result: Result) -> list[tuple[object, ...]]:
+    """The share of the squared residual that each cause has to exceed, joint by joint."""
+    best = {(t.cause, t.joint): t.gain for t in result.thresholds if t.gain <= 1.0}
+    ordered = sorted(best, key=lambda place: (place[0], place[1] or 0))
+    return [(title_of(cause), joint, _percent(best[cause, joint])) for cause, joint in ordered]
 
 
-def _shape(at: Mapping[str, Value]) -> str:
-    """For which waves, joint, speed or time it is, in words."""
-    return ", ".join(
-        _AT[name].format(
-            size=format_number(value.value, 3),
-            unit=format_unit(value.unit),
-            per="a turn" if value.unit == "1/rev" else "in 2π m",
-        )
-        for name, value in at.items()
-        if name in _AT and isinstance(value.value, int | float)
+def detection_limits(limits: Iterable[DetectionLimit], joints: int) -> Table:
+    """Return the smallest of each cause that would have been found, cause by joint."""
+    rows: dict[tuple[str, str], dict[int | None, str]] = {}
+    for one in limits:
+        what = f"{title_of(one.cause)}, {words.spoken(one.parameter)}"
+        rows.setdefault((what, one.minimum.unit), {})[one.joint] = _smallest(one)
+    columns = (None, *range(1, joints + 1))
+    heads = ("cause", "unit", "arm", *(f"joint {j}" for j in range(1, joints + 1)))
+    cells = (
+        (what, words.unit_or_dash(unit), *(own.get(joint) for joint in columns))
+        for (what, unit), own in rows.items()
     )
+    return Table(heads, tuple(cells))
 
 
-def _smallest(one: DetectionLimit) -> tuple[str, ...]:
-    """Value, unit, and for what it is; words where nothing that is expected would show."""
+def _smallest(one: DetectionLimit) -> str:
+    """The value, and for which order or joint; words where nothing that is expected would show."""
     value = one.minimum.value
-    parameters = [q for q in find_effect(one.cause).parameters if q.name == one.parameter]
-    ends = [abs(end) for q in parameters for end in (q.low, q.high) if end]
+    known = [q for q in find_effect(one.cause).parameters if q.name == one.parameter]
+    ends = [abs(end) for q in known for end in (q.low, q.high) if end]
     if isinstance(value, float) and ends and not one.or_less and value >= min(ends):
-        return "cannot be seen", "", ""
-    shown = format_number(value, 2) if isinstance(value, float) else format_value(one.minimum)
-    unit = unit_or_dash(one.minimum.unit)
-    return shown, unit, "this or less" if one.or_less else _shape(one.at)
+        return "cannot be seen"
+    shown = format_number(value, 2) if isinstance(value, float) else words.format_value(one.minimum)
+    at = "or less" if one.or_less else ", ".join(
+        _AT[name].format(size=format_number(x.value, 3), unit=format_unit(x.unit))
+        for name, x in one.at.items() if name in _AT and isinstance(x.value, int | float)
+    )  # fmt: skip
+    return f"{shown} ({at})" if at else shown
 
 
-def extension_report(result: Extension) -> Report:
-    """Verdict, key figures, one section a cause, what was refused."""
-    units, before = units_in(result), result.residual_rms
-    sections = [*_not_accepted(result)]
-    for number, one in enumerate(result.findings, 1):
-        sections.append(finding_section(number, one, before, False, "the noise", units))
-        sections.append(numbers_section(number, one, units))
-    sections += [_extension_basis(result, units), *data_quality(result.data_quality)]
-    tone: Tone = "good" if result.accepted else "attention" if result.findings else "bad"
-    words = f"{_extension_now(result)} {_say('extension_noise')}".strip()
-    floor, name = before.noise_floor, "noise of the residual"
-    errors = torque_errors(before, result.after_rms, result.rated, floor, name, words, units)
-    title = f"Extension of {result.robot}" if result.robot else "Extension"
-    basis = (laws_words(result.laws_of, fewer=result.fewer_terms),)
-    return Report(title, _extension_verdict(result), tone, errors, tuple(sections), basis=basis)
-
-
-def _extension_now(result: Extension) -> str:
-    """Return which model the column "now" is of; `diagnose` may give another figure."""
-    if not result.findings:
-        return ""
-    loads = [o for o in result.findings if o.origin == "base parameters"]
-    return _say("extension_now", named(loads[0].cause, loads[0].joint) if loads else "")
-
-
-def _extension_verdict(result: Extension) -> str:
-    refused = [words for _, words in together(result.rejected)]
-    found = [words for _, words in together(result.findings)]
-    reason = result.rejected[0].reason if result.rejected else "no cause was named"
-    return _say("extension", result, found, refused, without_keys(reason))
-
-
-def _not_accepted(result: Extension) -> list[Section]:
-    if not result.rejected:
-        return []
-    rows = tuple((title_of(o.cause), o.joint, without_keys(o.reason)) for o in result.rejected)
-    text = "The held-out logs do not bear it out. There is no way around that."
-    return [Section("Not accepted", (text,), (Table(("cause", "joint", "why"), rows),))]
-
-
-def _extension_basis(result: Extension, units: Units) -> Section:
-    laws = laws_words(result.laws_of, fewer=result.fewer_terms)
-    baseline = [without_keys(name) for name in result.baseline_effects]
-    text = _paragraphs("extension_basis", laws, result, baseline)
-    tables: tuple[Table, ...] = ()
-    if result.gain is not None and len(result.findings) > 1:
-        caption = "Gain of all accepted causes together, on held-out time, root mean square."
-        tables = (gain_table(result.gain, caption, units),)
-    return Section("What this rests on", text, tables)
+def above_floor(found: Diagnosis, number: int, rated: Sequence[float], units: Units) -> Table:
+    """The residual of each joint beside its floor, and which signals it follows."""
+    one, residual = found.evidence[number], found.residual_rms
+    columns: dict[str, list[object]] = {"joint": []}
+    for j in range(len(one.above_noise_floor)):
+        own = sorted((c for c in one.curves if c.joint == j + 1), key=lambda c: -c.explained)
+        share = 100.0 * residual.identify[j] / rated[j] if j < len(rated) else math.nan
+        known = np.isfinite(one.band[j]).all()
+        band = " to ".join(format_number(float(end), 2) for end in one.band[j]) if known else None
+        row = {
+            "joint": j + 1,
+            f"residual, rms [{units.torque}]": float(residual.identify[j]),
+            "residual [% of rated]": float(share) if share else None,
+            f"noise floor [{units.torque}]": float(residual.noise_floor[j]),
+            "power above the floor [%]": 100.0 * float(one.above_noise_floor[j]),
+            "mostly at [Hz]": band,
+            "follows most": ", ".join(
+                f"{c.against} ({100.0 * c.explained:.0f} %)" for c in own[:3]
+            ),
+        }
+        for name, cell in row.items():
+            columns.setdefault(name, []).append(cell)
+    return columns_table(columns)  # type: ignore[arg-type]

@@ -1,10 +1,9 @@
 """Describe findings in words: the verdict in one line a cause, their place and size.
 
 headlines(result)              the verdict, a line for each cause
-where(finding)                 " at joint 2 (from joint 1)"
+where(finding)                 "at joint 2 (from joint 1)"
 how_much(finding)              "0.349 ± 0.001 N m", "28.0 ± 0.1 Hz", "-10.0 ± 0.1 %"
-taken_in(finding, left)        ", most of which the nominal model had taken in"
-of_any_size(finding)           whether these logs leave open how large its torque is
+beyond_chance(finding)         whether held-out time alone shows that it is there
 """
 
 from __future__ import annotations
@@ -17,12 +16,11 @@ import numpy as np
 from pipelines.diagnosis.result import Alternative, Finding, Result, Value
 from pipelines.effects import find_effect
 from pipelines.estimation.nominal import within
-from pipelines.io.log import Array
 from pipelines.report.config import REPORT
-from pipelines.report.sentences import as_sentence
+from pipelines.report.document import sentence
 from pipelines.report.style import format_number, with_std
 
-__all__ = ["headlines", "how_much", "of_any_size", "other_joint", "taken_in", "where"]
+__all__ = ["beyond_chance", "headlines", "how_much", "of_any_size", "other_joint", "where"]
 
 # usual units, where these are not SI
 _USUAL = {"1": (100.0, "%"), "rad": (1e3, "mrad"), "m": (1e3, "mm"), "s": (1e3, "ms")}
@@ -32,51 +30,63 @@ _OTHER = {"from_joint": "from", "with_joint": "with"}  # parameters that name an
 
 
 def headlines(found: Result) -> tuple[str, ...]:
-    """Return the verdict: a line for each cause, or one line where no cause is named."""
-    changed = found.question == "what has changed"
-    if found.findings:
-        lines = [_line(one, found) for one in found.findings]
-        return (*lines, as_sentence(found.reason)) if found.reason else tuple(lines)
-    if found.verdict == "no-fault-found":
-        what = "No change since the reference logs" if changed else "No fault"
-        return (
-            f"{what} was found, as far as these logs can tell. {as_sentence(found.reason)}".strip(),
-        )
-    if found.verdict == "cannot-judge":
-        what = "has changed since the reference logs" if changed else "is wrong"
-        return (f"These logs cannot show whether anything {what}: {as_sentence(found.reason)}",)
-    return (f"The residual exceeds the noise, and no cause is named: {as_sentence(found.reason)}",)
+    """Return the verdict: a line for each cause, or one line where no cause is named.
+
+    Causes whose gain on held-out time is not beyond chance share the last line.
+    """
+    if not found.findings:
+        changed = found.question == "what has changed"
+        return (sentence("no_cause", found.verdict, changed, found.reason),)
+    any_sure = any(map(beyond_chance, found.findings))
+    lines, weak = [], []
+    for one in found.findings:
+        if any_sure and not beyond_chance(one):
+            weak.append(_cause(one, found.joints))
+        else:
+            lines.append(_line(one, found))
+    lines += [sentence("weaker", weak)] if weak else []
+    return (*lines, sentence("rest", found.reason)) if found.reason else tuple(lines)
+
+
+def beyond_chance(one: Finding) -> bool:
+    """Return whether a 95 % interval of the gain excludes zero, or other evidence names it."""
+    outside = one.origin not in ("residual", "reversals")
+    return outside or bool((one.gain.validate_torque_rms.ci95[:, 1] < 0.0).any())
 
 
 def _line(one: Finding, found: Result) -> str:
     """Return a cause: joint, size, probability, gain, share of the excess residual, next action."""
-    size, p = how_much(one), _probability(one.probability)
-    what = f"{one.title}{where(one, found.joints)}{f': {size}' if size else ''}{p}"
+    what = _cause(one, found.joints)
     if one.alternatives:
-        first, *more = one.alternatives
-        others = f"or {_alternative(one, first, found.joints)}"
-        others = f"{others}, or {len(more)} more" if more else others
-        words = f"{what}, {others}: these logs do not separate them."
-        whole = f"{words} {as_sentence(one.experiment or '')}".strip()
-        return whole if len(whole) <= REPORT.headline else words
-    gain = f"; {_gain(one, found)}, {100.0 * one.explained:.0f} % of the excess residual."
-    action = as_sentence(find_effect(one.cause).words.remedy.split(";")[0])
-    line = f"{what}{gain} {action}"
-    return line if len(line) <= REPORT.headline else f"{what}{gain}"
+        others = [_alternative(one, other, found.joints) for other in one.alternatives]
+        short, *action = (sentence("alternatives", what, others, x) for x in ("", one.experiment))
+    else:
+        gain = (_gain(one, found), one.explained)
+        remedy = find_effect(one.cause).words.remedy.split(";")[0]
+        short, *action = (sentence("gain", what, *gain, x) for x in ("", remedy))
+    return next((line for line in action if len(line) <= REPORT.headline), short)
 
 
-def _gain(one: Finding, found: Result) -> str:
+def _cause(one: Finding, names: Sequence[str]) -> str:
+    return sentence("cause", one.title, where(one, names), how_much(one), one.probability)
+
+
+def _alternative(first: Finding, other: Alternative, names: Sequence[str]) -> str:
+    like = replace(first, cause=other.cause, joint=other.joint, log=None, torque_rms=np.nan)
+    like = replace(like, parameters=other.parameters, probability=other.probability)
+    return _cause(replace(like, title=within(find_effect(other.cause).words.title)), names)
+
+
+def _gain(one: Finding, found: Result) -> dict[str, object]:
     """Return the held-out torque error of its joint, or of the largest, without and with it."""
     torque = one.gain.validate_torque_rms
     joint = int(np.argmax(torque.before - torque.after)) if one.joint is None else one.joint - 1
     unit, scale = _torque_unit(one), 1.0
     if joint < len(found.rated) and np.isfinite(found.rated[joint]):
         unit, scale = "% of rated", 100.0 / found.rated[joint]
-    before, after = (
-        format_number(float(x[joint]) * scale, 2) for x in (torque.before, torque.after)
-    )
-    at = f" of joint {joint + 1}" if one.joint is None else ""
-    return f"held-out torque error{at} {before} → {after} {unit}"
+    before, after = (float(x[joint]) * scale for x in (torque.before, torque.after))
+    at = joint + 1 if one.joint is None else None
+    return {"before": before, "after": after, "unit": unit, "joint": at}
 
 
 def _torque_unit(one: Finding) -> str:
@@ -85,34 +95,19 @@ def _torque_unit(one: Finding) -> str:
     return "N" if units & {"N", "N s/m", "N/m"} else "N m"  # the force of a contact is at the tip
 
 
-def _probability(p: float | None) -> str:
-    if p is None or not np.isfinite(p):
-        return ""
-    return " (p > 0.99)" if p > 0.99 else f" (p = {p:.2f})"
-
-
-def _alternative(first: Finding, other: Alternative, names: Sequence[str]) -> str:
-    like = replace(first, cause=other.cause, joint=other.joint, log=None)
-    like = replace(like, parameters=other.parameters, torque_rms=np.nan)
-    size, p = how_much(like), _probability(other.probability)
-    title = within(find_effect(other.cause).words.title)
-    return f"{title}{where(like, names)}{f': {size}' if size else ''}{p}"
-
-
 def where(one: Finding, names: Sequence[str] = ()) -> str:
     """Return the joint of a finding, the other joint it depends on, and when it happened.
 
     Args:
         names: of the joints; none: only the number is given.
     """
-    other, start = other_joint(one.parameters), one.parameters.get("start")
-    at = "" if one.joint is None else f" at joint {one.joint}"
+    start = one.parameters.get("start")
+    when = start.value if start is not None and isinstance(start.value, int | float) else None
     name = names[one.joint - 1] if one.joint is not None and one.joint <= len(names) else ""
-    told = ", ".join(x for x in (name if name != f"joint {one.joint}" else "", other) if x)
-    when = ""
-    if start is not None and isinstance(start.value, int | float):
-        when = f", {start.value:.2f} s into {one.log or 'every log'}"
-    return f"{at}{f' ({told})' if told else ''}{when}"
+    told = [
+        x for x in (name if name != f"joint {one.joint}" else "", other_joint(one.parameters)) if x
+    ]
+    return sentence("where", one.joint, told, when, one.log)
 
 
 def how_much(one: Finding) -> str:
@@ -144,19 +139,6 @@ def other_joint(parameters: Mapping[str, Value]) -> str:
         if isinstance(joint, int | float):
             return f"{word} joint {joint:g}"
     return ""
-
-
-def taken_in(one: Finding, left: Array) -> str:
-    """Return what is said where the nominal model imitates most of the power of a torque.
-
-    Its residual at that joint contains the part of that torque that it does not imitate.
-
-    Args:
-        left: (joints,) [N m] rms that the nominal model leaves of the logs it was fitted to.
-    """
-    rest = float(np.nanmax(left)) if one.joint is None else float(left[one.joint - 1])
-    most = one.torque_rms**2 > 2.0 * rest**2
-    return ", most of which the nominal model had taken in" if most else ""
 
 
 def of_any_size(one: Finding) -> bool:

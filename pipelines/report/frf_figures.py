@@ -1,4 +1,4 @@
-"""Figures of frequency responses: Fig. 17's Bode plots, the rigid body, compliance."""
+"""Figures of frequency responses: Fig. 17's Bode plots, the rigid body and the modes."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from pipelines.frequency.result import COHERENCE, Curve, Method, Posture, same_b
 from pipelines.frequency.spectra import Complex, Intervals, inside
 from pipelines.report import style
 from pipelines.report.config import REPORT
-from pipelines.report.figures import Array, Look, joint_colour
+from pipelines.report.figures import Array, Look, joint_colour, legend
 from pipelines.report.report import Figure
-from pipelines.report.sentences import sentence
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,7 +38,9 @@ def posture_words(posture: Array, joint: int) -> str:
     return f"{', '.join(names)} = {', '.join(angles)} rad"
 
 
-def bode_figure(joint: int, drawn: Sequence[tuple[Posture, Mapping[str, Method]]]) -> Figure:
+def bode_figure(
+    joint: int, drawn: Sequence[tuple[Posture, Mapping[str, Method]]], caption: str
+) -> Figure:
     """Magnitude, phase and coherence, one column a posture; Fig. 17."""
     unit = "rad/(rad/s²)" if drawn[0][0].input == "r" else "rad/(N m)"
     heights = (3, 2, 1.2)
@@ -56,9 +57,9 @@ def bode_figure(joint: int, drawn: Sequence[tuple[Posture, Mapping[str, Method]]
             grid[:, 0], (f"|P| [{unit}]", "phase [°]", "coherence"), strict=True
         ):
             axis.set_ylabel(label)
-        grid[0, -1].legend(loc="lower left", fontsize="small")
+        legend(grid[0, -1])
 
-    return Figure(f"bode-{joint}", sentence("frf", "bode", joint, COHERENCE), draw, (6.4, 5.6))
+    return Figure(f"bode-{joint}", caption, draw, (6.4, 5.6))
 
 
 def draw_bode(axes: Sequence[Axes], posture: Posture, methods: Mapping[str, Method]) -> None:
@@ -154,7 +155,7 @@ def _good_points(curve: Curve, posture: Posture) -> tuple[Array, Complex]:
     return curve.frequency[good], curve.value[good]
 
 
-def relative_figure(joint: int, postures: Sequence[Posture]) -> Figure:
+def relative_figure(joint: int, postures: Sequence[Posture], caption: str) -> Figure:
     """Acceleration per input: points, and the rational function over them."""
 
     def draw(drawing: Drawing) -> None:
@@ -175,10 +176,10 @@ def relative_figure(joint: int, postures: Sequence[Posture]) -> Figure:
         phase.set_xlabel("frequency [Hz]")
         phase.set_ylim(-190.0, 190.0)
         phase.set_yticks((-180, -90, 0, 90, 180))
-        size.legend(loc="best", fontsize="small")
+        legend(size)
         style.log_ticks(phase.xaxis)
 
-    return Figure(f"relative-{joint}", sentence("frf", "relative", joint), draw, (6.0, 4.0))
+    return Figure(f"relative-{joint}", caption, draw, (6.0, 4.2))
 
 
 def fitted_scale(axis: Axes, values: Array) -> None:
@@ -190,36 +191,3 @@ def fitted_scale(axis: Axes, values: Array) -> None:
     axis.set_yscale("log")
     axis.set_ylim(0.6 * low, 1.7 * high)
     style.log_ticks(axis.yaxis)
-
-
-def compliance_figure(joint: int, postures: Sequence[Posture]) -> Figure:
-    """Compliance q/τ and accelerance q̈/τ, with those of the rigid body."""
-    units = ("rad/(N m)", "1/(kg m²)") if postures[0].revolute else ("m/N", "1/kg")
-
-    def draw(drawing: Drawing) -> None:
-        axes = drawing.subplots(1, 2)
-        for k, posture in enumerate(postures):
-            color, label = joint_colour(k), posture_words(posture.posture, joint)
-            f, value = _good_points(posture.compliance, posture)
-            square = (2.0 * np.pi * f) ** 2
-            axes[0].loglog(f, np.abs(value), color=color, label=label)
-            axes[1].semilogx(f, np.abs(value) * square, color=color)
-            if (inertia := posture.expected_inertia) is not None:
-                dotted: Look = {"color": color, "linestyle": ":", "linewidth": 0.9}
-                axes[0].loglog(f, 1.0 / (inertia * square), **dotted)
-                axes[1].axhline(1.0 / inertia, **dotted)
-        for axis, name, unit in zip(axes, ("compliance", "accelerance"), units, strict=True):
-            axis.set_title(f"{name} [{unit}]", pad=3.0)
-            axis.set_xlabel("frequency [Hz]")
-            style.log_ticks(axis.xaxis)
-        style.log_ticks(axes[0].yaxis)
-        known = [(p, p.inertia) for p in postures if p.inertia is not None]
-        per_torque = [np.abs(p.fit.value) / (p.level.value * i.value) for p, i in known]
-        if per_torque:
-            fitted_scale(axes[1], np.concatenate(per_torque))
-        axes[0].legend(loc="lower left", fontsize="small")
-
-    caption = (
-        f"Joint {joint}: compliance and accelerance by torque. Dotted: the model's rigid body."
-    )
-    return Figure(f"compliance-{joint}", caption, draw, (6.4, 3.2))

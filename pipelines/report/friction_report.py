@@ -1,4 +1,4 @@
-"""The report of a friction fit: Table III with deviations, Figs. 5 and 6, curve and choice."""
+"""The report of a friction fit: Table III with deviations, Fig. 6, curve and choice of the law."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipelines.effects import find_effect
-from pipelines.estimation.nominal import plain_number
 from pipelines.friction.config import FindingsConfig
 from pipelines.friction.findings import drift_in_words
 from pipelines.friction.fit import Value
@@ -17,10 +16,10 @@ from pipelines.friction.laws import law_named
 from pipelines.friction.result import JointResult, Result, Series
 from pipelines.report import style
 from pipelines.report.config import REPORT
-from pipelines.report.figures import Look, draw_measured, draw_modelled, envelope, rows_figure
-from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
-from pipelines.report.sections import data_quality
-from pipelines.report.sentences import capital, paragraphs, sentence
+from pipelines.report.document import document
+from pipelines.report.figures import Look, legend, signals_figure
+from pipelines.report.report import Figure, Report, Table, Tone
+from pipelines.report.sections import checks_table
 from pipelines.report.style import format_unit, with_std
 from pipelines.report.words import spoken
 
@@ -28,236 +27,144 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Drawing
 
-_THIN = 0.01  # numerics: of the curve: a narrower band is hidden by the line
 _GRAVITY = {
     "sine": "c in c sin q + c' cos q",
     "cosine": "c' in c sin q + c' cos q",
     "constant": "weight along the axis",
 }
 
-_say, _paragraphs = partial(sentence, "friction"), partial(paragraphs, "friction")
-
 
 def friction_report(result: Result) -> Report:
     """The verdict first; then every joint's law, figures and choice of the law."""
-    sections = [_summary(result)]
-    for joint in result.joints:
-        sections += _joint_sections(joint)
-    sections += data_quality(result.checks)
-    key = _key_figures(result)
-    return Report("Friction", _verdict(result), _tone(result), key, tuple(sections))
+    joints = result.joints
+    parameters, meanings = _parameters(joints)
+    gates = [check.message for check in result.checks if check.gate]
+    sure = all(_well(joint) and not joint.unseen for joint in joints)
+    tone: Tone = "bad" if gates else "good" if sure else "attention"
+    return document(
+        "friction",
+        tone,
+        result=result,
+        gates=gates,
+        poor=[joint.name for joint in joints if joint.validation.by and not _well(joint)],
+        limit=FindingsConfig().poor,
+        units={joint.joint: units_of(joint) for joint in joints},
+        drift=drift_in_words,
+        plain=plain_law,
+        reason=lambda law: plain_law(re.sub(r"\b([a-z]\w*)\.([a-z]\w*)", r"\2 of \1", law.reason)),
+        gravity=lambda joint: ", ".join(
+            with_std(x.value, x.std) for name in _GRAVITY if (x := joint.gravity.get(name))
+        ),
+        ratio=_ratio,
+        parameters=parameters,
+        meanings=meanings,
+        better=_plainer,
+        figures={joint.joint: _figures(joint) for joint in joints},
+        checks_table=checks_table,
+    )
 
 
-def _units(joint: JointResult) -> tuple[str, str, str]:
+def units_of(joint: JointResult) -> tuple[str, str, str]:
     """Of position, speed and torque."""
     return ("rad", "rad/s", "N m") if joint.revolute else ("m", "m/s", "N")
 
 
 def _ratio(joint: JointResult) -> float | None:
-    """Speed error of the simulation with friction over that without."""
-    with_, without = joint.validation.velocity_error_with, joint.validation.velocity_error_without
-    if with_ is None:
+    """Speed error of the simulation with friction over that without; of torque if not simulated."""
+    judged = joint.validation
+    with_, without = judged.velocity_error_with, judged.velocity_error_without
+    if not judged.by:
+        return judged.torque_error
+    if with_ is None or without == 0.0:
         return None
-    if without is None:
-        return 0.0
-    return with_ / without if without > 0.0 else None
+    return 0.0 if without is None else with_ / without
 
 
 def _well(joint: JointResult) -> bool:
-    if joint.validation.by:
-        ratio = _ratio(joint)
-        return ratio is not None and ratio <= REPORT.good_speed
-    error = joint.validation.torque_error  # nothing was simulated
-    return joint.moved and error is not None and error < REPORT.good_torque
+    ratio = _ratio(joint)
+    most = REPORT.good_speed if joint.validation.by else REPORT.good_torque
+    return joint.moved and ratio is not None and ratio <= most
 
 
-def _tone(result: Result) -> Tone:
-    if any(check.gate for check in result.checks):
-        return "bad"
-    sure = all(_well(joint) and not joint.unseen for joint in result.joints)
-    return "good" if sure else "attention"
-
-
-def _verdict(result: Result) -> str:
-    joints, simulated = [], [joint for joint in result.joints if joint.validation.by]
-    for joint in result.joints:
-        error = joint.validation.torque_error
-        if error is not None and error >= FindingsConfig().poor:  # the finding says it
-            error = None
-        joints.append(
-            {
-                "name": capital(joint.name),
-                "law": _plain(joint.law),
-                "moved": joint.moved,
-                "validation": joint.validation,
-                "leaves": error,
-                "unit": _units(joint)[1],
-            }
-        )
-    remarks = [drift_in_words(joint) for joint in result.joints]
-    return _say(
-        "verdict",
-        gates=[check.message for check in result.checks if check.gate],
-        joints=joints,
-        refitted=any(not joint.validation.held_out for joint in simulated),
-        poor=[joint.name for joint in simulated if not _well(joint)],
-        remarks=[words for words in remarks if words],
-        open=[joint.name for joint in result.joints if joint.unseen],
-    )
-
-
-def _plain(law: str) -> str:
+def plain_law(law: str) -> str:
+    """A law as people read it."""
     for key, words in (("three_sigmoid", "three sigmoids"), ("stribeck", "Stribeck")):
         law = law.replace(key, words)
     return law.replace("coulomb", "Coulomb").replace("_", " ").replace("+", " + ")
 
 
-def _parameter(name: str) -> str:
-    """ "Coulomb friction, level" for "coulomb.level"; the paper's own letters stay."""
-    effect, dot, quantity = name.partition(".")
-    return f"{find_effect(effect).words.title}, {spoken(quantity)}" if dot else name
-
-
-def _meaning(joint: JointResult, name: str) -> str:
-    """Return the meaning of a number of the joint's law."""
-    effect, _, quantity = name.rpartition(".")
-    members = (effect,) if effect else law_named(joint.law).members
-    known = [q for member in members for q in find_effect(member).parameters]
-    return next((q.meaning for q in known if q.name == quantity), "")
-
-
-def _std(value: Value | None) -> str | None:
-    return None if value is None else with_std(value.value, value.std)
-
-
-def _key_figures(result: Result) -> Table:
-    simulated = any(joint.validation.by for joint in result.joints)
-    rows = []
-    for joint in result.joints:
-        gravity = ", ".join(_std(joint.gravity[k]) or "" for k in _GRAVITY if k in joint.gravity)
-        error = _ratio(joint) if simulated else joint.validation.torque_error
-        left = None if error is None else 100.0 * error
-        rows.append((joint.name, _plain(joint.law), _std(joint.inertia), gravity, left))
-    error_name = "held-out torque that is left, rms [%]"
-    if simulated:
-        error_name = "speed error, friction in / left out [%]"
-    columns = ("joint", "law", "inertia [kg m^2]", "gravity: sine, cosine [N m]", error_name)
-    return Table(columns, tuple(rows))
-
-
-def _summary(result: Result) -> Section:
-    """Table III, which the print of the paper has lost."""
-    joints = result.joints
+def _parameters(joints: tuple[JointResult, ...]) -> tuple[Table, list[tuple[str, str]]]:
+    """Table III, which the print of the paper has lost, and what each number is."""
     values: dict[str, tuple[str, list[Value | None]]] = {}  # name -> meaning, joint by joint
     for name in sorted({name for joint in joints for name in joint.parameters}):
+        effect, dot, quantity = name.partition(".")
+        words = f"{find_effect(effect).words.title}, {spoken(quantity)}" if dot else name
         first = next(joint for joint in joints if name in joint.parameters)
-        found = [joint.parameters.get(name) for joint in joints]
-        values[_parameter(name)] = (_meaning(first, name), found)
+        members = (effect,) if dot else law_named(first.law).members
+        known = [q for member in members for q in find_effect(member).parameters]
+        meaning = next((q.meaning for q in known if q.name == name.rpartition(".")[2]), "")
+        values[words] = (meaning, [joint.parameters.get(name) for joint in joints])
     values["J"] = ("inertia about the joint, the others held", [joint.inertia for joint in joints])
-    for joint in joints:
-        for name in _GRAVITY:
-            if name in joint.gravity:
-                own = [other.gravity.get(name) for other in joints]
-                values.setdefault(f"gravity, {name}", (_GRAVITY[name], own))
-    rows: list[tuple[Cell, ...]] = []
+    for name, meaning in _GRAVITY.items():
+        own = [joint.gravity.get(name) for joint in joints]
+        values |= {f"gravity, {name}": (meaning, own)} if any(own) else {}
+    rows = []
     for name, (_, found) in values.items():
         unit = next((format_unit(v.unit) for v in found if v is not None), "")
-        rows.append((name, *map(_std, found), unit))
+        texts = (None if v is None else with_std(v.value, v.std) for v in found)
+        rows.append((name, *texts, unit))
     columns = ("parameter", *(joint.name for joint in joints), "unit")
-    caption = "As Table III of Kostić et al. 2004: value ± std."
-    meanings = tuple((name, meaning) for name, (meaning, _) in values.items())
-    tables = (
-        Table(columns, tuple(rows), caption, keeps_empty=True),
-        Table(("parameter", "what it is"), meanings),
-    )
-    text = "Compare curves, not labels: several sets of numbers give one curve."
-    return Section("Parameters", (text,), tables)
+    table = Table(columns, tuple(rows), keeps_empty=True)
+    return table, [(name, meaning) for name, (meaning, _) in values.items()]
 
 
-def _joint_sections(joint: JointResult) -> list[Section]:
-    name, speed = joint.name, _units(joint)[1]
-    drift = drift_in_words(joint)
-    text = _paragraphs("joint", joint, speed, drift, _sticking(joint))
-    sections = [Section(f"{name}: friction", text, _tables(joint), (_curve_figure(joint),))]
-    if joint.validation.by:
-        figures = (_simulation_figure(joint), _fraction_figure(joint))
-        said = _paragraphs("simulation", joint.validation, speed)
-        sections.append(Section(f"{name}: simulation", said, figures=figures))
-    choice = Section(f"{name}: choice of the law", _choice_words(joint), (_candidates(joint),))
-    return [*sections, choice]
-
-
-def _sticking(joint: JointResult) -> dict[str, str] | None:
-    """How many rows are left out where the joint sticks, and up to which travel."""
-    if joint.sticking is None:
+def _plainer(joint: JointResult) -> dict[str, object] | None:
+    """The best law with fewer numbers than the chosen one, and by how much it is worse."""
+    laws = [law for law in joint.candidate_laws if not law.reason]
+    chosen = next((law for law in joint.candidate_laws if law.chosen), joint.candidate_laws[0])
+    plainer = [law for law in laws if law.size < chosen.size]
+    if not plainer or min(law.validate_rms for law in joint.candidate_laws) <= 0.0:
         return None
-    travel = f"{plain_number(joint.sticking.distance)} {_units(joint)[0]}"
-    return {"share": plain_number(100.0 * joint.sticking.share), "travel": travel}
-
-
-def _tables(joint: JointResult) -> tuple[Table, ...]:
-    tables = []
-    if joint.unseen:
-        gaps = tuple((gap.what, gap.record) for gap in joint.unseen)
-        columns = ("not shown by these logs", "what to record")
-        attention: tuple[Tone, ...] = tuple("attention" for _ in gaps)
-        tables.append(Table(columns, gaps, tones=attention))
-    return tuple(tables)
-
-
-def _choice_words(joint: JointResult) -> tuple[str, ...]:
-    """How the law was chosen, and by how much the best law with fewer numbers is worse."""
-    laws = joint.candidate_laws
-    by_logs = joint.judged_by == "logs"
-    chosen = next((law for law in laws if law.chosen), laws[0])
-    usable = [law for law in laws if not law.reason]
-    plainer = [law for law in usable if law.size < chosen.size]
-    if not plainer or min(law.validate_rms for law in laws) <= 0.0:
-        return _paragraphs("choice", len(laws), by_logs, None, None, None, 0.0)
     plain = min(plainer, key=lambda law: law.validate_rms)
-    best = min(usable, key=lambda law: law.validate_rms)
-    more = 100.0 * (plain.validate_rms / best.validate_rms - 1.0)  # than the best: as was tested
-    names = [{"law": _plain(law.law), "size": law.size} for law in (chosen, plain)]
-    than = "" if best is chosen else _plain(best.law)
-    return _paragraphs("choice", len(laws), by_logs, *names, than, more)
+    best = min(laws, key=lambda law: law.validate_rms)
+    more = plain.validate_rms / best.validate_rms - 1.0  # than the best: as was tested
+    return {"chosen": chosen, "plain": plain, "best": best, "more": more}
 
 
-def _candidates(joint: JointResult) -> Table:
-    rows, tones = [], list[Tone]()
-    for law in joint.candidate_laws:
-        # "amplitude of presliding" for "presliding.amplitude": names of settings are no words
-        reason = _plain(re.sub(r"\b([a-z]\w*)\.([a-z]\w*)", r"\2 of \1", law.reason))
-        verdict = "chosen" if law.chosen else reason or ("not worse" if law.alike else "worse")
-        errors = (1e3 * law.identify_rms, 1e3 * law.validate_rms)
-        rows.append((_plain(law.law), law.size, *errors, verdict))
-        tones.append("good" if law.chosen else "neutral")
-    columns = ("law", "numbers", "left, fitted [mN m]", "left, held out [mN m]", "")
-    caption = "Root mean square of the residual of mean torques over windows."
-    return Table(columns, tuple(rows), caption, tuple(tones))
+def _figures(joint: JointResult) -> list[Figure]:
+    """Friction over speed; and measured over simulated speed, friction left out and in (Fig. 6)."""
+    s, (_, speed, torque) = joint.series, units_of(joint)
+    widest = 2.0 * float(np.max(s.band))
+    band = f"; ± 2 std shaded, at most {widest:.2g} {torque}" if np.isfinite(widest) else ""
+    draw = partial(_draw_curves, series=s, units=(speed, torque))
+    figures = [
+        Figure(f"curve-{joint.joint}", f"{joint.name}: the fitted law{band}.", draw, (6.0, 2.6))
+    ]
+    if joint.validation.by:
+        caption = (
+            f"{joint.name}: measured and simulated speed. Gravity is compensated at the measured "
+            "position."
+        )
+        speeds = {"measured": s.dq, "with friction": s.dq_with, "friction left out": s.dq_without}
+        columns = {label: values.reshape(-1, 1) for label, values in speeds.items()}
+        name, quantity = f"simulation-{joint.joint}", f"speed [{speed}]"
+        figures.append(signals_figure(name, caption, s.t, columns, quantity, [joint.name]))
+    return figures
 
 
-def _curve_figure(joint: JointResult) -> Figure:
-    """Friction torque against speed: all of it, and the part about zero."""
-    series, (_, speed, torque) = joint.series, _units(joint)
-    width, height = 2.0 * float(np.max(series.band)), float(np.max(np.abs(series.curve)))
-    known = bool(np.isfinite(width)) and height > 0.0
-    thin = width < _THIN * height
-    caption = _say("curve", joint.name, width if known else None, torque, thin)
-
-    def draw(drawing: Drawing) -> None:
-        whole, near = drawing.subplots(1, 2, sharey=True, width_ratios=(3, 2))
-        fastest = float(series.speed.max())
-        draw_curve(whole, series, fastest)
-        draw_curve(near, series, REPORT.near_rest * fastest)
-        whole.set_ylabel(f"friction [{torque}]")
-        drawing.supxlabel(f"speed [{speed}]", fontsize="medium")
-        whole.legend(loc="upper left", borderpad=0.2)
-        near.set_title("about zero", pad=3.0)
-
-    return Figure(f"curve-{joint.joint}", caption, draw)
+def _draw_curves(drawing: Drawing, series: Series, units: tuple[str, str]) -> None:
+    """The whole curve, and the part about zero."""
+    whole, near = drawing.subplots(1, 2, sharey=True, width_ratios=(3, 2))
+    fastest = float(series.speed.max())
+    _draw_curve(whole, series, fastest)
+    _draw_curve(near, series, REPORT.near_rest * fastest)
+    whole.set_ylabel(f"friction [{units[1]}]")
+    drawing.supxlabel(f"speed [{units[0]}]", fontsize="medium")
+    near.set_title("about zero", pad=3.0)
+    legend(whole)
 
 
-def draw_curve(axis: Axes, series: Series, reach: float) -> None:
+def _draw_curve(axis: Axes, series: Series, reach: float) -> None:
     """The law with its band."""
     inside = np.abs(series.speed) <= 1.05 * reach
     v, curve, band = series.speed[inside], series.curve[inside], 2.0 * series.band[inside]
@@ -268,51 +175,3 @@ def draw_curve(axis: Axes, series: Series, reach: float) -> None:
     axis.axvline(0.0, color=style.GREY, linewidth=0.6)
     axis.set_xlim(-1.03 * reach, 1.03 * reach)
     axis.locator_params(axis="x", nbins=5)
-
-
-def _fraction_figure(joint: JointResult) -> Figure:
-    """Torque and its friction, gravity and inertial fractions, Fig. 5."""
-    s = joint.series
-    fractions = {
-        "torque": (s.torque, style.BLACK),
-        "friction": (s.friction, style.GREEN),
-        "gravity": (s.gravity, style.PURPLE),
-        "inertia": (s.inertial, style.BLUE),
-    }
-    names = list(fractions)
-
-    def draw_row(axis: Axes, k: int) -> None:
-        values, color = fractions[names[k]]
-        axis.plot(*envelope(s.t, values, 800), color=color, linewidth=0.9)
-
-    caption = f"{joint.name}: torque of {joint.validation.by} and its fractions in the simulation."
-    quantity = "torque [N m]" if joint.revolute else "force [N]"
-    return rows_figure(
-        f"fractions-{joint.joint}", caption, names, draw_row, quantity, row=1.15, sharey=True
-    )
-
-
-def _simulation_figure(joint: JointResult) -> Figure:
-    """Measured over simulated position and speed, friction left out and in, Fig. 6."""
-    s, (position, speed, _) = joint.series, _units(joint)
-    columns = {
-        "friction left out": ((s.q, s.q_without), (s.dq, s.dq_without)),
-        "with friction": ((s.q, s.q_with), (s.dq, s.dq_with)),
-    }
-
-    def draw(drawing: Drawing) -> None:
-        grid = drawing.subplots(2, 2, sharex=True)
-        for column, (title, signals) in zip(grid.T, columns.items(), strict=True):
-            for axis, (measured, simulated) in zip(column, signals, strict=True):
-                draw_measured(axis, *envelope(s.t, measured, 800))
-                draw_modelled(axis, *envelope(s.t, simulated, 800), "simulated")
-                axis.margins(x=0.01, y=0.08)
-                axis.locator_params(axis="y", nbins=5)
-            column[0].set_title(title, pad=3.0)
-            column[1].set_xlabel("time [s]")
-        grid[0, 0].set_ylabel(f"position [{position}]")
-        grid[1, 0].set_ylabel(f"speed [{speed}]")
-        grid[0, 1].legend(loc="best", borderpad=0.2)
-
-    what = "measured and simulated motion. Gravity is compensated at the measured position."
-    return Figure(f"simulation-{joint.joint}", f"{joint.name}: {what}", draw, (6.0, 4.0))

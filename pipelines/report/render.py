@@ -11,14 +11,14 @@ from __future__ import annotations
 import hashlib
 import io
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pipelines.errors import Check
 from pipelines.io.output import write_file
+from pipelines.report.document import template
 from pipelines.report.report import (
     Figure,
     Report,
@@ -27,19 +27,17 @@ from pipelines.report.report import (
     Tone,
     are_numbers,
     column_texts,
+    figures_in,
     filled,
 )
-from pipelines.report.sentences import template
 from pipelines.report.style import figure_style, format_unit, printable
 
 if TYPE_CHECKING:
+    from markupsafe import Markup
     from matplotlib.artist import Artist
-    from matplotlib.figure import Figure as Drawing
     from matplotlib.text import Text
 
-__all__ = ["Picture", "drawn", "in_short", "render_report", "write_report"]
-
-Picture = tuple[str, bytes]  # SVG and PNG
+__all__ = ["in_short", "render_report", "write_report"]
 
 _WORDS: Final[dict[Tone, str]] = {
     "good": "Good",
@@ -48,6 +46,8 @@ _WORDS: Final[dict[Tone, str]] = {
     "neutral": "Result",
 }
 _PARAGRAPH = 4000  # numerics: characters; longer ones are cut
+_SHORT, _LONG = 14, 40  # numerics: characters of a cell that is kept on one line; that gets room
+_ONE_SHEET = 12  # numerics: rows of a table that is not broken in print
 _NUMBER_AND_UNIT = re.compile(
     r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(%|°C|[mµnk]?(s|Hz|N|m|rad|g|A|V|W)\b|(min|deg|rev)\b))"
     r"|(?<=\bN) (?=m\b)|(?<=[\d)]) (?=[±×] [\d∞])|(?<=[±×]) (?=[\d∞])"
@@ -73,21 +73,16 @@ def _put(content: bytes, path: Path) -> None:
 
 def render_report(report: Report, footer: Mapping[str, str]) -> dict[str, bytes]:
     """The files of a report by their names, "report.html" first; nothing is written."""
-    names = iter(_file_names(f.name for section in report.sections for f in section.figures))
-    named = [[(next(names), figure) for figure in s.figures] for s in report.sections]
-    pictures = _pictures({name: figure for figures in named for name, figure in figures})
+    figures = list(figures_in(report.sections))
+    names = _file_names(figure.name for figure in figures)
     files: dict[str, bytes] = {}
-    sections: list[dict[str, object]] = []
-    glyphs: set[str] = set()
-    for section, figures in zip(report.sections, named, strict=True):
-        shown = []
-        for name, figure in figures:
-            svg, files[f"figures/{name}.png"] = pictures[name]
-            files[f"figures/{name}.svg"] = svg.encode()
-            alt = figure.alt or figure.caption
-            inline = _inline(svg, f"f{len(files) // 2}-", alt, glyphs)
-            shown.append({"caption": _prose(figure.caption), "svg": inline})
-        sections.append(_section_words(section) | {"figures": shown, "n": len(sections) + 1})
+    shown: list[dict[str, object]] = []
+    for number, (name, figure) in enumerate(zip(names, figures, strict=True), 1):
+        svg, png = figure.finished(name) or _draw(figure, name)
+        files |= {f"figures/{name}.png": png, f"figures/{name}.svg": svg.encode()}
+        caption = _prose(figure.caption)
+        shown.append({"caption": caption, "svg": _inline(svg, f"f{number}-", caption)})
+    drawn = iter(shown)
     page = template("page.html").render(
         title=printable(report.title),
         verdict=[_prose(line) for line in report.verdict.split("\n")],
@@ -95,8 +90,7 @@ def render_report(report: Report, footer: Mapping[str, str]) -> dict[str, bytes]
         tone=report.tone,
         words=_WORDS,
         key_figures=report.key_figures and _table_words(report.key_figures),
-        sections=sections,
-        contents=_contents([printable(section.title) for section in report.sections]),
+        sections=[_section_words(section, drawn) for section in report.sections],
         footer=[(printable(name), _prose(value)) for name, value in footer.items()],
     )
     return {"report.html": page.encode(), **files}
@@ -110,48 +104,21 @@ def in_short(report: Report, checks: Sequence[Check] = ()) -> str:
     return template("notebook.html").render(verdict=verdict, said=said, table=table)
 
 
-def _pictures(figures: Mapping[str, Figure]) -> dict[str, Picture]:
-    """Every figure's picture by the name of its file; what was drawn before is not drawn again."""
-    found = {name: figure.finished(name) for name, figure in figures.items()}
-    missing = drawn({name: figures[name] for name in figures if found[name] is None}, _draw)
-    return {name: picture or missing[name] for name, picture in found.items()}
-
-
-def drawn(
-    figures: Mapping[str, Figure], draw: Callable[[Figure, str], Picture]
-) -> dict[str, Picture]:
-    """Return `draw(figure, name)` of each figure."""
-    return {name: draw(figure, name) for name, figure in figures.items()}
-
-
 def _prose(text: object) -> str:
     """Printable text with every number kept on one line with its unit."""
     return _NUMBER_AND_UNIT.sub("\u00a0", printable(text, _PARAGRAPH))
 
 
-def _contents(titles: Sequence[str]) -> list[dict[str, object]]:
-    """Links to all sections; sections in a row that begin alike, "diagnose: …", share one line."""
-    parts: list[dict[str, object]] = []
-
-    def stage(item: tuple[int, str]) -> str:
-        return item[1].partition(": ")[0] if ": " in item[1] else ""
-
-    for beginning, group in groupby(enumerate(titles, 1), key=stage):
-        links = list(group)
-        shared = beginning if len(links) > 1 else ""
-        ends = [(n, title.partition(": ")[2] if shared else title) for n, title in links]
-        parts.append({"of": shared, "links": ends})
-    return parts
-
-
-def _section_words(section: Section) -> dict[str, object]:
+def _section_words(section: Section, drawn: Any) -> dict[str, object]:
+    """The section as the page takes it; `drawn` gives the next figure."""
     return {
         "title": printable(section.title),
         "text": [_prose(words) for words in section.text],
         "warning": _prose(section.warning),
         "tables": [_table_words(table) for table in section.tables],
-        "leads": section.leads,
+        "figures": [next(drawn) for _ in section.figures],
         "folded": section.folded,
+        "parts": [_section_words(part, drawn) for part in section.parts],
     }
 
 
@@ -165,31 +132,25 @@ def _table_words(table: Table) -> dict[str, object]:
         unit = format_unit(unit.removesuffix("]")) if bracket else ""
         columns.append({"name": name, "unit": unit, "kind": _kind(cells)})
     tones = table.tones or (None,) * len(table.rows)
-    narrow = len(columns) <= 3 and not (table.tones or any(c["unit"] for c in columns))
+    rows = zip(zip(*texts, strict=True), tones, strict=True)
     return {
         "caption": _prose(table.caption),
         "columns": columns,
         "tones": bool(table.tones),
-        "whole": len(table.rows) <= 12,  # kept on one sheet of paper
-        "stacks": narrow,  # on a phone
-        "rows": [
-            {"cells": cells, "tone": tone}
-            for cells, tone in zip(zip(*texts, strict=True), tones, strict=True)
-        ],
+        "whole": len(table.rows) <= _ONE_SHEET,
+        "rows": [{"cells": cells, "tone": tone} for cells, tone in rows],
     }
 
 
 def _kind(cells: Sequence[str]) -> str:
     """How a column is set: numbers to the right, what is short on one line, long words wide."""
+    longest = max(map(len, cells), default=0)
     if are_numbers(cells):
         return "number"
-    numeric = [cell[:1].isdigit() or cell[:1] in "(−±" for cell in cells]
-    if all(len(cell) <= (30 if n else 14) for cell, n in zip(cells, numeric, strict=True)):
-        return "short"
-    return "long" if any(len(cell) > 40 for cell in cells) else "words"
+    return "short" if longest <= _SHORT else "long" if longest > _LONG else "words"
 
 
-def _file_names(wanted: Iterator[str]) -> list[str]:
+def _file_names(wanted: Iterable[str]) -> list[str]:
     """File names that are safe on every system, and no two alike."""
     taken: dict[str, str] = {}  # in lower case -> as it is
     for original in wanted:
@@ -204,14 +165,15 @@ def _file_names(wanted: Iterator[str]) -> list[str]:
     return list(taken.values())
 
 
-def _draw(figure: Figure, salt: str) -> Picture:
+def _draw(figure: Figure, salt: str) -> tuple[str, bytes]:
     """SVG and PNG of one figure, free of dates and of the text they were drawn from."""
     with figure_style(salt):
         from matplotlib.figure import Figure as Drawing
 
         drawing = Drawing(figsize=figure.size, layout="constrained")
         figure.draw(drawing)
-        _make_printable(drawing)
+        for text in _texts(drawing):
+            text.set_text("\n".join(map(printable, text.get_text().split("\n"))))
         if (layout := drawing.get_layout_engine()) is not None:
             layout.execute(drawing)
         drawing.set_layout_engine(None)  # laid out once, for both files
@@ -223,26 +185,18 @@ def _draw(figure: Figure, salt: str) -> Picture:
     return _without_ballast(svg.getvalue().decode()), png.getvalue()
 
 
-def _make_printable(drawing: Drawing) -> None:
-    for text in _texts(drawing):
-        if words := text.get_text():
-            text.set_text("\n".join(printable(line) for line in words.split("\n")))
-
-
 def _texts(artist: Artist) -> Iterator[Text]:
-    """Every text below `artist` but numbers beside ticks, which are made when they are drawn."""
+    """Every text below `artist` but those beside ticks, which whoever draws has made printable."""
     from matplotlib.axis import Axis
     from matplotlib.text import Text
-    from matplotlib.ticker import FixedFormatter
 
     for child in artist.get_children():
         if isinstance(child, Axis):
             yield child.label
-            if not isinstance(child.get_major_formatter(), FixedFormatter):
-                continue
-        if isinstance(child, Text):
+        elif isinstance(child, Text):
             yield child
-        yield from _texts(child)
+        else:
+            yield from _texts(child)
 
 
 def _without_ballast(svg: str) -> str:
@@ -255,34 +209,19 @@ def _without_ballast(svg: str) -> str:
 
 
 def _short_path(path: str) -> str:
-    def hundredths(number: re.Match[str]) -> str:
-        return f"{float(number[0]):.2f}".rstrip("0").rstrip(".")
-
-    path = re.sub(r"-?\d+\.\d{3,}", hundredths, path)
+    path = re.sub(r"-?\d+\.\d{3,}", lambda number: f"{float(number[0]):.2f}", path)
     return re.sub(r"\s*([A-Za-z])\s*", r"\1", " ".join(path.split()))
 
 
-def _inline(svg: str, prefix: str, alt: str, glyphs: set[str]) -> Any:
-    """`svg` as part of the page: its own identifiers, letters shared with the figures above it."""
+def _inline(svg: str, prefix: str, alt: str) -> Markup:
+    """`svg` as part of the page, with identifiers of its own."""
     from markupsafe import Markup, escape
-
-    def define(found: re.Match[str]) -> str:
-        known = found[1] in glyphs
-        glyphs.add(found[1])
-        return "" if known else found[0]
-
-    def own(found: re.Match[str]) -> str:
-        return found[0] if found[2] in glyphs else found[1] + prefix + found[2]
 
     body = svg[svg.index("<svg") :].replace("xlink:href=", "href=")
     # matplotlib's own rule would hold for all of the page; the template has it for drawings alone
     body = re.sub(r"<style.*?</style>", "", body, flags=re.DOTALL)
     box = re.search(r'viewBox="([^"]*)"', body)
     body = body[body.index(">") + 1 :]
-    # letters are named after font and glyph, equal names are equal outlines
-    letter = r'<path id="([A-Za-z][\w.-]*-[0-9a-f]+)"[^>]*transform="scale\(0\.015625\)"/>'
-    body = re.sub(r'( id="|href="#|url\(#)([^")]+)', own, re.sub(letter, define, body))
-    body = body.replace("<defs></defs>", "").replace("<defs/>", "").strip()
-    label = escape(printable(alt))
-    head = f'<svg viewBox="{box[1] if box else ""}" role="img" aria-label="{label}">'
+    body = re.sub(r'( id="|href="#|url\(#)', rf"\1{prefix}", body)
+    head = f'<svg viewBox="{box[1] if box else ""}" role="img" aria-label="{escape(alt)}">'
     return Markup(head + body)  # outlines and numbers only: no text of the report is in the body

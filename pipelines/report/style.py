@@ -14,7 +14,7 @@ import os
 import re
 import tempfile
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -35,14 +35,7 @@ GREEN: Final = "#009e73"
 ORANGE: Final = "#e69f00"
 SKY: Final = "#56b4e9"
 PURPLE: Final = "#cc79a7"
-COLOURS: Final = (
-    BLUE,
-    VERMILLION,
-    GREEN,
-    ORANGE,
-    SKY,
-    PURPLE,
-)  # in the order of their contrast
+COLOURS: Final = (BLUE, VERMILLION, GREEN, ORANGE, SKY, PURPLE)  # in the order of their contrast
 
 
 def printable(text: object, limit: int = 400) -> str:
@@ -70,14 +63,10 @@ def enumerated(words: Iterable[str], word: str = "and") -> str:
 
 
 def format_number(value: float | None, digits: int = 4) -> str:
-    """`value` with `digits` significant digits, fewer where it is `Rounded`; a dash for none."""
+    """`value` with `digits` significant digits; a dash for none."""
     if value is None or math.isnan(value):
         return "–"
-    if isinstance(value, Rounded):
-        digits = min(digits, value.digits)
-    if item := getattr(
-        value, "item", None
-    ):  # NumPy's integers and truth values are no int and no bool
+    if item := getattr(value, "item", None):  # NumPy's integers are no int
         value = item()
     if isinstance(value, bool):
         return "yes" if value else "no"
@@ -89,33 +78,6 @@ def format_number(value: float | None, digits: int = 4) -> str:
     if value != 0.0 and not -3 <= exponent <= 5:
         return f"{_trimmed(mantissa)} × 10{_raised(exponent)}"
     return _grouped(_trimmed(f"{float(value):.{max(0, digits - 1 - exponent)}f}"))
-
-
-class Rounded(float):
-    """A number for a cell, shown with so many significant digits.
-
-    A column of equally many decimals fills it up with digits of its own, where a number that was
-    rounded before would get zeros that are not significant.
-    """
-
-    digits: int
-
-    def __new__(cls, value: float, digits: int = 3) -> Rounded:
-        number = super().__new__(cls, value)
-        number.digits = digits
-        return number
-
-
-def three_digits(value: float | None) -> Rounded | None:
-    """For a cell of a table: three digits are all that it can use."""
-    return Rounded(value) if value is not None and math.isfinite(value) else None
-
-
-def to_one_place(values: Sequence[float]) -> list[float | None]:
-    """Rounded to one decimal place, where the largest has three digits and the smallest two."""
-    sizes = [math.floor(math.log10(abs(x))) for x in values if math.isfinite(x) and x != 0.0]
-    place = max(2 - max(sizes), 1 - min(sizes)) if sizes else 0
-    return [round(float(x), place) if math.isfinite(x) else None for x in values]
 
 
 def format_decimals(value: float, decimals: int) -> str:

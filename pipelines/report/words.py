@@ -14,14 +14,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from pipelines.diagnosis.result import Diagnosis, Extension, Finding, Rejected, Value
-from pipelines.diagnosis.result import Result as Diagnosed
-from pipelines.dynamics.parameter_names import Named, named_in, numbered, part_of
+from pipelines.dynamics.parameter_names import named_in, numbered, part_of
 from pipelines.effects import effect_names, find_effect
 from pipelines.estimation.nominal import within
 from pipelines.estimation.preparation import FewerTerms
+from pipelines.report.document import capital, sentence
 from pipelines.report.finding_words import other_joint
-from pipelines.report.sentences import capital, sentence
-from pipelines.report.style import enumerated, format_number, format_unit, unit_in_words, with_std
+from pipelines.report.style import enumerated, format_unit, unit_in_words, with_std
 
 _COUNTED = ("second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 _KEY = re.compile(r"\b([a-z]+(?:_[a-z]+)*)(?::(\d+)(?::([a-z]+(?:_[a-z]+)*))?)?\b")
@@ -31,11 +30,6 @@ _TURNING = {"position": "rad", "speed": "rad/s", "acceleration": "rad/s^2", "tor
 def cause_at(cause: str, joint: int | None) -> str:
     """As causes are written on the command line."""
     return cause if joint is None else f"{cause}:{joint}"
-
-
-def is_cause(name: str) -> bool:
-    """Return whether it may be wrong, and is no friction law that any nominal model may have."""
-    return name in effect_names() and find_effect(name).evidence != "none"
 
 
 def title_of(cause: str) -> str:
@@ -60,18 +54,17 @@ def together(found: Iterable[Finding | Rejected]) -> list[tuple[str, str]]:
 
 def at_places(places: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
     """The same of (cause, joint in words) each; of the whole arm the joint is ""."""
-    joints: dict[str, list[str]] = {}
-    for cause, joint in places:
-        joints.setdefault(cause, []).append(joint)
-    return [(cause, _at_joints(cause, own)) for cause, own in joints.items()]
-
-
-def _at_joints(cause: str, joints: Sequence[str]) -> str:
-    own = list(dict.fromkeys(joint for joint in joints if joint))  # several orders at one joint
-    if not own:
-        return named(cause, None)
-    rest = " and at all joints together" if "" in joints else ""
-    return f"{named(cause, None)} at joint{'s' * (len(own) > 1)} {enumerated(own)}{rest}"
+    joints: dict[str, dict[str, None]] = {}
+    for cause, joint in places:  # several orders at one joint count once
+        joints.setdefault(cause, {})[joint] = None
+    found = []
+    for cause, own in joints.items():
+        words, numbers = named(cause, None), [joint for joint in own if joint]
+        if numbers:
+            words += f" at joint{'s' * (len(numbers) > 1)} {enumerated(numbers)}"
+            words += " and at all joints together" * ("" in own)
+        found.append((cause, words))
+    return found
 
 
 def spoken(parameter: str) -> str:
@@ -121,9 +114,7 @@ def format_value(value: Value) -> str:
     """ "0.102 ± 0.003", or three of them."""
     values = value.value if isinstance(value.value, tuple | list) else (value.value,)
     stds = value.std if isinstance(value.std, tuple | list) else (value.std,) * len(values)
-    return ", ".join(
-        format_number(x) if s is None else with_std(x, s) for x, s in zip(values, stds, strict=True)
-    )
+    return ", ".join(with_std(x, s) for x, s in zip(values, stds, strict=True))
 
 
 def format_values(parameters: Iterable[tuple[str, Value]]) -> str:
@@ -160,8 +151,13 @@ def figure_in_words(name: str, within: bool = False) -> str:
     if found is None:
         return name
     said, parameter = named(found.cause, found.joint), found.what
-    if found.of_law:
-        said, parameter = _of_a_joint(found)
+    if found.of_law:  # a parameter of an effect of the law, of the law, or of the joint itself
+        effect, dot, quantity = found.what.partition(".")
+        effect, own = effect.replace(" ", "_"), found.what.replace(" ", "_")
+        if dot and effect in effect_names():
+            said, parameter = named(effect, found.joint), quantity
+        elif all(q.name != own for q in find_effect(found.cause).parameters):
+            said = f"joint {found.joint}"
     if found.before:
         said = f"{found.before}: {said}"
     elif not within:
@@ -169,42 +165,14 @@ def figure_in_words(name: str, within: bool = False) -> str:
     return f"{said}, {spoken(parameter)}" if parameter else said
 
 
-def _of_a_joint(found: Named) -> tuple[str, str]:
-    """Return a parameter that fit-friction names by the law of the joint, in words.
-
-    It is a parameter of one of the effects that make the law up, "coulomb.level", of an effect that
-    is the law, or of the joint itself, as its inertia is.
-    """
-    effect, dot, quantity = found.what.partition(".")
-    effect = effect.replace(" ", "_")
-    if dot and effect in effect_names():
-        return named(effect, found.joint), quantity
-    own = found.what.replace(" ", "_")
-    if any(q.name == own for q in find_effect(found.cause).parameters):
-        return named(found.cause, found.joint), found.what
-    return f"joint {found.joint}", found.what
-
-
-def laws_words(laws_of: str, in_run: str = "", fewer: Sequence[FewerTerms] = ()) -> str:
-    """Return which friction laws diagnose and extend fit; `in_run`: the option of a run."""
-    return sentence("diagnosis", "laws", laws_of, in_run, fewer_words(fewer))
-
-
 def fewer_words(fewer: Sequence[FewerTerms]) -> tuple[str, ...]:
     """Return one sentence for all joints where the same laws replace the same law."""
     found = []
     for law, taken in dict.fromkeys((one.law, one.taken) for one in fewer):
         alike = [one for one in fewer if (one.law, one.taken) == (law, taken)]
-        titles = [find_effect(name).words.title for name in taken]
-        law_title = find_effect(law).words.title
-        found.append(sentence("diagnosis", "fewer", law_title, alike, titles))
+        titles = [title_of(name) for name in taken]
+        found.append(sentence("fewer", title_of(law), alike, titles))
     return tuple(found)
-
-
-def threshold_words(result: Diagnosed) -> str:
-    """Return what a cause has to exceed."""
-    origins = sorted({one.origin for one in result.thresholds})
-    return sentence("diagnosis", "thresholds", origins)
 
 
 @dataclass(frozen=True)
@@ -224,18 +192,13 @@ class Units:
     @property
     def thousandths(self) -> str:
         """Of position."""
-        return each(self.position, before="m")
+        return joined(f"m{unit}" for unit in self.position.split(" or "))
 
     def at(self, joint: int | None) -> Units:
         """Return the units of one joint, from 1; of all for None."""
         if joint is None or joint > len(self.turning):
             return self
         return Units(self.turning[joint - 1 : joint])
-
-
-def each(units: str, behind: str = "", before: str = "") -> str:
-    """ "rad/s or m/s" of "rad or m" and "/s"."""
-    return joined(f"{before}{unit}{behind}" for unit in units.split(" or "))
 
 
 def joined(units: Iterable[str], otherwise: str = "") -> str:

@@ -3,248 +3,183 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pipelines.report import style
-from pipelines.report.config import REPORT
-from pipelines.report.figures import compared_figure
-from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
-from pipelines.report.sections import NO_COLLISION_CHECK
-from pipelines.report.sentences import capital, paragraphs, sentence
-from pipelines.report.style import format_number, format_unit, three_digits
-from pipelines.report.words import each, joined
-from pipelines.report.writing_figures import (
-    executed_figure,
-    part_name,
-    simulated_figures,
-    split_figure,
-    task_figures,
+from pipelines.report.document import document
+from pipelines.report.figures import (
+    Array,
+    Look,
+    joint_signal_figure,
+    legend,
+    one_figure,
+    signals_figure,
 )
+from pipelines.report.report import Figure, Report, Tone
+from pipelines.report.sections import NO_COLLISION_CHECK
+from pipelines.report.style import format_number
+from pipelines.report.words import joined
 from pipelines.writing.control_cases import Case
 from pipelines.writing.task import Designed
 from pipelines.writing.validation import Result
 
-_PARTS = ("inertia", "coriolis", "gravity", "friction", "effects")
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Drawing
 
-_say, _paragraphs = partial(sentence, "writing"), partial(paragraphs, "writing")
+_AXES = ("x", "y", "z")
+_WIDTH = 5.2  # numerics: [inch] of a path in a figure
+_LEFT = (1, 2, 3, 4)  # numerics: Fig. 16 has the first four cases on one side
 
 
 def writing_report(result: Result) -> Report:
     """The torque, Table IV, the simulation; or the task that was designed."""
-    if result.design is not None:
-        return _task_report(result, result.design)
-    sections = (
-        _torque_section(result),
-        _cases_section(result),
-        _simulation_section(result),
-    )
-    basis = (f"The model: {result.model}. --model FILE judges another.",)
-    tone, key = _tone(result), _key_figures(result)
-    return Report("Writing task", _verdict(result), tone, key, sections, basis=basis)
-
-
-def _tone(result: Result) -> Tone:
+    if (task := result.design) is not None:
+        tone: Tone = "good" if task.torque_checked else "attention"
+        figures, warning = _task_figures(task, result.joints), NO_COLLISION_CHECK
+        return document(
+            "task", tone, task=task, joints=result.joints, figures=figures, warning=warning
+        )
     gates = [result.gates.torque]
-    if any(log.experiment == "writing" for log in result.logs):  # the cases are of writing
+    writing = [log for log in result.logs if log.experiment == "writing"]
+    if writing:  # the cases are of writing
         gates.append(result.gates.cases)
-    return "bad" if False in gates else "good" if all(gates) else "attention"
-
-
-def _verdict(result: Result) -> str:
-    writing = sum(log.experiment == "writing" for log in result.logs)
-    said: dict[str, object] = {"torque": (), "logs": writing or len(result.logs), "complete": ""}
-    if (torque := result.torque) is not None:
-        errors = torque.relative_error
-        said["torque"] = [f"{format_number(100.0 * float(x), 2)} %" for x in errors]
-    by = {one.case: one for one in result.cases}
-    if {1, 6} <= set(by):
-        same = by[1].origin == by[6].origin
-        said["complete"], said["alone"] = _mm(by[6]), _mm(by[1])
-        said["origin"] = by[6].origin if same else "partly simulated"
-    said["cases"] = said["complete"] or result.cases_left_out
-    return capital(_say("verdict", result, said))
-
-
-def _mm(case: Case) -> str:
-    values = case.tip_error_std.values
-    return ", ".join(f"{1e3 * x:.2f}" if x >= 1e-4 else format_number(1e3 * x, 2) for x in values)
-
-
-def _key_figures(result: Result) -> Table | None:
-    if (torque := result.torque) is None:
-        return None
-    log = next(one for one in result.logs if one.experiment == "writing" or torque.of != "writing")
-    simulated = result.simulation
-    position = None if simulated is None else simulated.position_rms
-    simulated_torque = None if simulated is None or position is None else simulated.torque_rms
-    rows, tones = [], list[Tone]()
-    for j, name in enumerate(result.joints):
-        share = torque.relative_error[j]
-        below = bool(share < result.gates.torque_limit)
-        measured = map(three_digits, (torque.signal_rms[j], torque.rms[j], 100 * share))
-        others = (None if x is None else three_digits(x[j]) for x in (position, simulated_torque))
-        rows.append((name, *measured, "yes" if below else "no", *others))
-        tones.append("good" if below else "bad")
-    unit = joined(log.torque_units)
-    length = joined("rad" if own == "N m" else "m" for own in log.torque_units)
-    columns = (
-        "joint",
-        f"torque, rms [{unit}]",
-        f"model misses, rms [{unit}]",
-        "of it [%]",
-        "below the gate",
-        f"simulated position off by, rms [{length}]",
-        f"simulated torque off by, rms [{unit}]",
+    units = next(iter(writing or result.logs), None)
+    return document(
+        "writing",
+        "bad" if False in gates else "good" if all(gates) else "attention",
+        result=result,
+        logs=len(writing) or len(result.logs),
+        cases={one.case: one for one in result.cases},
+        unit=joined(units.torque_units) if units else "N m",
+        millimetres=lambda case: ", ".join(map(_mm, case.tip_error_std.values)),
+        spread=_spread,
+        gain=_gain,
+        torque_figures=_torque_figures(result),
+        cases_figures=_executed(result.cases),
+        simulated_figures=_simulated(result),
     )
-    return Table(columns, tuple(rows), f"The model: {result.model}.", tuple(tones))
 
 
-def _torque_section(result: Result) -> Section:
-    felt = any((log.parts_rms["effects"] > REPORT.felt * log.rms).any() for log in result.logs)
-    parts = [name for name in _PARTS if felt or name != "effects"]
-    rows = []
-    for log in result.logs:
-        errors = (log.relative_error, log.relative_error_low_pass)
-        values = (log.signal_rms, log.rms, *(100 * x for x in errors))
-        columns = [*values, *(log.parts_rms[name] for name in parts)]
-        for j, name in enumerate(result.joints):
-            rows.append((f"{log.name}, {name}", *(three_digits(x[j]) for x in columns)))
-    cutoffs = sorted({log.low_pass_hz for log in result.logs if log.low_pass_hz is not None})
-    ends = [format_number(hz, 2) for hz in (cutoffs[:1] + cutoffs[-1:])] or ["", ""]
-    heads = ("log, joint", "torque", "left", "left [%]", "low-passed [%]", *map(part_name, parts))
-    caption = (
-        "Root mean squares in N m (N of a joint that slides): the measured torque, the residual of "
-        "the model, and the parts of the model."
-    )
-    table = Table(heads, tuple(rows), caption)
-    figures = _torque_figures(result)
-    text = _paragraphs("torque", *ends)
-    return Section("Torque: the first validation", text, (table,), figures)
+def _mm(x: float) -> str:
+    return f"{1e3 * x:.2f}" if x >= 1e-4 else format_number(1e3 * x, 2)
 
 
-def _torque_figures(result: Result) -> tuple[Figure, ...]:
-    """Of the first log that has curves."""
-    log = next((one for one in result.logs if one.course is not None), None)
-    if log is None or log.course is None:
-        return ()
-    c = log.course
-    measured = compared_figure(
-        f"torque-{log.name}",
-        f"{log.name}: torque measured and of the model, the friction in it, and the residual.",
-        c.t,
-        c.measured,
-        c.model,
-        f"torque [{log.torque_units[0]}]",
-        "model",
-        result.joints,
-        (("friction", c.friction, style.GREEN), ("residual", c.residual, style.BLACK)),
-    )
-    return measured, split_figure(log, c, result.joints)
-
-
-def _cases_section(result: Result) -> Section:
-    base = [one.logs[0] for one in result.cases if one.origin == "simulated"]
-    text = _paragraphs("cases", result, base[0] if base else "")
-    title = "Control cases: the second validation"
-    if not result.cases:
-        return Section(title, text)
-    first = next((one for one in result.cases if one.case == 1), None)
-    rows: list[tuple[Cell, ...]] = []
-    tones: list[Tone] = []
-    for one in result.cases:
-        spread = (
-            (None,) * 3 if one.tip_error_std_spread is None else one.tip_error_std_spread.values
+def _spread(one: Case) -> list[str]:
+    """Tip error of each axis, [mm] with three digits, and the spread with one where it shows."""
+    spread = one.tip_error_std_spread
+    found = []
+    for k, x in enumerate(one.tip_error_std.values):
+        decimals = max(0, 2 - math.floor(math.log10(1e3 * x))) if x > 0.0 else 0
+        own = 0.0 if spread is None else 1e3 * spread.values[k]
+        found.append(
+            f"{1e3 * x:.{decimals}f}" + (f" ± {format_number(own, 1)}" if own >= 5e-5 else "")
         )
-        pairs = zip(one.tip_error_std.values, spread, strict=False)
-        ahead = ", ".join(one.feedforward).replace("coriolis", "Coriolis") or "nothing"
-        gain = _gain(first, one) if first is not None and one is not first else ""
-        rows.append(
-            (
-                one.case,
-                ahead,
-                *(_with_spread(*p) for p in pairs),
-                gain,
-                one.origin,
-                ", ".join(one.logs),
-            )
-        )
-        gate = result.gates.cases if one.case == 6 else None
-        tones.append({None: "neutral", True: "good", False: "bad"}[gate])  # type: ignore[arg-type]
-    heads: tuple[str, ...] = ("case", "ahead of the feedback", "x [mm]", "y [mm]", "z [mm]")
-    heads += ("case 1 over it, x, y, z", "origin", "log")
-    caption = "Standard deviation of the tip's error, as Table IV of Kostić et al. 2004."
-    table = Table(heads, tuple(rows), caption, tuple(tones))
-    figure = executed_figure(result.cases)
-    return Section(title, text, (table,), () if figure is None else (figure,))
+    return found
 
 
-def _gain(first: Case, one: Case) -> str:
+def _gain(first: Case | None, one: Case) -> str:
     """Tip error of the first case over that of another, axis by axis."""
+    if first is None or one is first:
+        return ""
     pairs = zip(first.tip_error_std.values, one.tip_error_std.values, strict=True)
     return ", ".join(format_number(a / b, 2) if b > 0.0 else "∞" for a, b in pairs)
 
 
-def _with_spread(value: float, spread: float | None) -> str:
-    """[mm] with three digits, and the spread with one where it shows."""
-    decimals = 2 - math.floor(math.log10(1e3 * value)) if value > 0.0 else 0
-    shown = f"{1e3 * value:.{max(0, decimals)}f}"
-    if spread is None or 1e3 * spread < 5e-5:
-        return shown
-    return f"{shown} ± {format_number(1e3 * spread, 1)}"
+def _torque_figures(result: Result) -> list[Figure]:
+    """Of the first log that has curves."""
+    for log in result.logs:
+        if (c := log.course) is not None:
+            caption = (
+                f"{log.name}: torque measured and of the model, its friction, and the residual."
+            )
+            signals = {"measured": c.measured, "model": c.model, "friction": c.friction}
+            signals["residual"] = c.residual
+            name, quantity = f"torque-{log.name}", f"torque [{joined(log.torque_units)}]"
+            return [signals_figure(name, caption, c.t, signals, quantity, result.joints)]
+    return []
 
 
-def _simulation_section(result: Result) -> Section:
+def _simulated(result: Result) -> list[Figure]:
     found = result.simulation
-    if found is None:
-        return Section("The task simulated", (f"Left out: {result.simulation_left_out}.",))
-    figures = (found.position_rms, found.position_max, found.speed_rms, found.torque_rms)
-    rows = tuple(
-        (name, *(None if x is None else three_digits(x[j]) for x in figures))
-        for j, name in enumerate(result.joints)
-    )
-    unit, torque_unit = joined(found.units), joined(found.torque_units)
-    columns = (
-        "joint",
-        f"position, rms [{unit}]",
-        f"position, largest [{unit}]",
-        f"speed, rms [{each(unit, '/s')}]",
-        f"torque, rms [{torque_unit}]",
-    )
-    table = Table(columns, rows, "Simulated minus measured.")
-    drawn: tuple[Figure, ...] = ()
-    if found.course is not None:
-        drawn = tuple(simulated_figures(found.name, found.course, unit, torque_unit))
-    return Section("The task simulated", _paragraphs("simulation", found), (table,), drawn)
+    if found is None or found.course is None:
+        return []
+    c, caption = found.course, f"{found.name}: position, measured and simulated."
+    signals = {"measured": c.position, "simulated": c.position_simulated}
+    quantity = f"position [{joined(found.units)}]"
+    return [
+        signals_figure(f"simulated-{found.name}", caption, c.t, signals, quantity, result.joints)
+    ]
 
 
-def _task_report(result: Result, task: Designed) -> Report:
-    """The task that was designed."""
-    most = max(task.limits, key=lambda one: one.share, default=None)
-    nearest = None
-    if most is not None and np.isfinite(most.share) and most.share > 0.0:
-        name = result.joints[most.joint - 1]
-        nearest = {
-            "joint": most.joint,
-            "name": name,
-            "share": most.share,
-            "quantity": most.quantity,
-        }
-    rows = []
-    for one in task.limits:
-        bounded = np.isfinite(one.limit)
-        limit, share = (one.limit, 100 * one.share) if bounded else ("none", None)
-        name, unit = result.joints[one.joint - 1], format_unit(one.unit)
-        rows.append((one.joint, name, one.quantity, one.peak, limit, unit, share, one.t))
-    limits = Table(
-        ("joint", "name", "quantity", "peak", "limit", "unit", "share [%]", "at [s]"),
-        tuple(rows),
-        "The most that the task asks. Anything beyond a limit would have been refused.",
-    )
-    sections = (
-        Section("Before the robot moves", tables=(limits,), warning=NO_COLLISION_CHECK),
-        Section("The task", figures=tuple(task_figures(task, result.joints))),
-    )
-    tone: Tone = "good" if task.torque_checked else "attention"
-    return Report("Writing task", _say("task", task, nearest), tone, None, sections)
+def _plane(tip: Array) -> list[int]:
+    """The two axes in which a path (points, 3) is widest, as x, y, z go."""
+    return sorted(np.argsort(-np.ptp(tip, axis=0), kind="stable")[:2].tolist())
+
+
+def _executed(cases: Sequence[Case]) -> list[Figure]:
+    """The letters as executed in the control cases, 1 to 4 above, 5 and 6 below. Fig. 16."""
+    shown = [(one, one.track) for one in cases if one.track is not None]
+    both = [[s for s in shown if (s[0].case in _LEFT) is left] for left in (True, False)]
+    panels = [part for part in both if part]
+    if not panels:
+        return []
+    wanted = shown[0][1].wanted
+    axes = _plane(wanted)
+
+    def draw(drawing: Drawing) -> None:
+        rows = drawing.subplots(len(panels), 1, squeeze=False)[:, 0]
+        for axis, part in zip(rows, panels, strict=True):
+            look: Look = {"color": style.BLACK, "alpha": 0.25, "label": "wanted"}
+            axis.plot(*wanted[:, axes].T, linewidth=2.6, **look)
+            for one, track in part:
+                color, path = style.COLOURS[(one.case - 1) % 6], track.executed[:, axes]
+                axis.plot(*path.T, color=color, linewidth=0.8, label=f"case {one.case}")
+            _finish_path(axis, axes)
+            axis.legend(loc="best", ncols=3)
+
+    width, height = np.ptp(wanted[:, axes], axis=0)
+    high = len(panels) * (0.9 + _WIDTH * height / max(width, 1e-9))
+    simulated = [str(one.case) for one, _ in shown if one.origin == "simulated"]
+    caption = "The path of the tip as executed, on the wanted one."
+    caption += f" Simulated: case {', '.join(simulated)}." if simulated else ""
+    return [Figure("executed", caption, draw, (6.0, float(min(high, 9.0))))]
+
+
+def _finish_path(axis: Axes, axes: Sequence[int]) -> None:
+    axis.set_aspect("equal")
+    axis.margins(0.03)
+    axis.set_xlabel(f"{_AXES[axes[0]]} [m]")
+    axis.set_ylabel(f"{_AXES[axes[1]]} [m]")
+
+
+def _task_figures(task: Designed, joints: Sequence[str]) -> list[Figure]:
+    """The path and the speed of the tip (Fig. 2), the motion of the joints (Fig. 3)."""
+    width, height = np.ptp(task.tip[:, _plane(task.tip)], axis=0)
+    path = "The path of the tip; grey on the way between strokes."
+    speed = "The speed of the tip: fast within a stroke, at rest in corners."
+    size = min(1.0 + _WIDTH * float(height) / max(float(width), 1e-9), 6.0)
+    unit = joined(task.units)
+    tip = task.tip_speed.reshape(-1, 1)
+    return [
+        one_figure("path", path, partial(_draw_path, task=task), size),
+        joint_signal_figure("tip-speed", speed, task.t, tip, "speed [m/s]", names=["tip"]),
+        joint_signal_figure("joint-position", "Position of the joints.", task.t, task.q,
+                            f"position [{unit}]", names=joints),
+        joint_signal_figure("joint-speed", "Speed of the joints.", task.t, task.dq,
+                            f"speed [{unit}/s]", names=joints),
+    ]  # fmt: skip
+
+
+def _draw_path(axis: Axes, task: Designed) -> None:
+    axes = _plane(task.tip)
+    path = task.tip[:, axes]
+    strokes = np.where((task.drawn > 0.0)[:, None], path, np.nan)
+    axis.plot(*path.T, color=style.GREY, linewidth=0.7, alpha=0.6, label="way between strokes")
+    axis.plot(*strokes.T, color=style.BLUE, linewidth=1.6, label="strokes")
+    _finish_path(axis, axes)
+    legend(axis)

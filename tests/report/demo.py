@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.report.figures import interval_figure, joint_signal_figure, timeline_figure
+from pipelines.report.figures import joint_signal_figure
 from pipelines.report.report import Report, Section, Table
 from pipelines.report.sections import checks_table
 from pipelines.report.style import with_std
@@ -43,25 +43,17 @@ def demo_report(samples: int = 60_000, joints: int = 6) -> Report:
         ("usable for identification", "91.2 %", "the rest is missing or at a torque limit"),
         ("sampling jitter", with_std(2.83, 0.02) + " µs", "1.4 % of the sample time: harmless"),
         ("longest gap", "0.40 s", "the log was split here")))
-    start, stop = float(t[0]), float(t[-1])
     return Report(
         "Inspection of tx40_excitation.h5", "One joint lost its encoder for 0.6 s; the rest of the log can be used.",
         "attention", key, (
             Section("What was checked", ("Six checks, three found something. Nothing in the file was changed.",),
                     (checks_table(checks),)),
-            Section("Sampling", ("The log has one gap. Between the samples the clock is steady.",), figures=(
-                timeline_figure("timeline", "When something happened. Joint 2 is missing once, for 0.6 s; the torque "
-                                "limit is met in every swing of joints 1 and 2.", (start, stop),
-                                [("gap", [(5.99, 6.4)]), ("q missing, joint 2", [(2.4, 3.0)]),
-                                 ("torque at limit", [(x, x + 0.02) for x in np.arange(0.2, 12.0, 0.7)]),
-                                 ("lone spike", [(8.0, 8.0)])]),
-                interval_figure("intervals", "Time between samples. All intervals but the gap lie within 12 µs of "
-                                "the nominal 200 µs.", t, 2e-4))),
+            Section("Sampling", ("The log has one gap. Between the samples the clock is steady.",)),
             Section("Signals", ("Each row is one joint.",), (ranges,), (
                 joint_signal_figure("position", "Position over time. The shaded stretch of joint 2 holds no samples.",
-                                    t, q, "rad", quantity="position", names=names, flagged=np.isnan(q),
+                                    t, q, "position [rad]", names=names, flagged=np.isnan(q),
                                     flag_name="missing"),
                 joint_signal_figure("torque", "Torque over time. Marked samples rest at the limit of ±19.5 N m and say "
-                                    "nothing about the arm.", t, tau, "N m", quantity="torque", names=names,
+                                    "nothing about the arm.", t, tau, "torque [N m]", names=names,
                                     flagged=full, flag_name="at the limit"))),
             Section("What comes next", ("The marked samples are left out of every later fit.",))))

@@ -16,10 +16,10 @@ from pipelines.diagnosis.result import (
 )
 from pipelines.effects import effect_names, find_effect
 from pipelines.estimation.model_fit import TorqueGain
-from pipelines.report.diagnosis_finding import (
-    finding_section,
-    numbers_section,
-)
+from pipelines.report import words
+from pipelines.report.diagnosis_report import finding_context
+from pipelines.report.document import sections_of
+from pipelines.report.words import Units
 
 KEY = re.compile(r"[a-z]+_[a-z0-9]+|\b[a-z]+:\d")
 COMMAND = re.compile(r'"rrrid [^"]*"')
@@ -38,10 +38,13 @@ def found(cause: str) -> Finding:
 @pytest.mark.parametrize("cause", effect_names())
 def test_a_finding_is_told_in_words(cause: str) -> None:
     """Of every effect: no key in what is said of it but in the command that is typed; each number with what it is."""
-    said = " ".join(finding_section(1, found(cause), ResidualRms(*(np.ones(3),) * 3)).text)
+    told = finding_context(1, found(cause), ResidualRms(*(np.ones(3),) * 3), Units())
+    told |= {"folded": False, "command": "", "every": ""}
+    (section,) = sections_of("finding", told=told, words=words, units=Units())
+    said = " ".join(section.text)
     assert "torque offset at joint 1" in said
     assert KEY.findall(COMMAND.sub("", said)) == []
-    numbers = numbers_section(1, found(cause)).tables[0]
+    numbers = section.tables[0]
     assert len(numbers.rows) == len(find_effect(cause).parameters)
     for name, _, unit, meaning in numbers.rows:
         assert KEY.findall(f"{name} {meaning}") == []

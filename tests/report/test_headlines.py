@@ -18,7 +18,7 @@ from pipelines.report.finding_words import headlines, how_much
 def finding(cause: str, joint: int | None = 3) -> Finding:
     """A finding with every number that its effect has."""
     before, after = np.array([0.5, 0.4, 0.02]), np.array([0.5, 0.4, 0.005])
-    gain = Gain(TorqueGain(before, after, np.zeros((3, 2))), None, "closed-loop", None)
+    gain = Gain(TorqueGain(before, after, np.full((3, 2), -0.01)), None, "closed-loop", None)
     numbers = {q.name: Value(0.5, 0.01, q.unit) for q in find_effect(cause).parameters if q.name != "start"}
     return Finding(cause, joint, find_effect(cause).words.title, numbers, 0.98, 0.9, (), "Record more.", gain, "residual",
                    0.03, float("nan"), None, probability=0.97)
@@ -36,6 +36,14 @@ def test_every_cause_has_a_line_of_its_own(cause: str) -> None:
     assert len(said) == 2
     assert len(said[0]) <= 240
     assert all(words in said[0] for words in ("joint 3 (elbow", "(p = 0.97)", "0.02 → 0.005 N m", "98 %"))
+
+
+def test_a_cause_within_chance_is_no_headline_of_equal_rank() -> None:
+    weak = finding("payload", None)
+    torque = replace(weak.gain.validate_torque_rms, ci95=np.array([[-0.01, 0.01]] * 3))
+    first, second = lines(finding("cogging"), replace(weak, gain=replace(weak.gain, validate_torque_rms=torque)))
+    assert first.startswith("Cogging at joint 3 (elbow")
+    assert second.startswith("Possible as well, but its gain on held-out time is not beyond chance: Payload")
 
 
 @pytest.mark.parametrize("cause", effect_names())

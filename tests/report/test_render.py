@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.report.figures import joint_signal_figure, timeline_figure
+from pipelines.report.figures import joint_signal_figure, one_figure
 from pipelines.report.render import render_report
 from pipelines.report.report import Figure, Report, Section, Table
 from tests.report.demo import FOOTER, demo_report
@@ -48,16 +48,16 @@ def report_of(words: list[str]) -> Report:
     """A report that shows `words` in every place that takes a text."""
     t = np.arange(50) / 100.0
     values = np.tile(np.sin(20.0 * t)[:, None], (1, len(words)))
-    figures = [joint_signal_figure("signals", word, t, values, word, quantity=word, names=words, flagged=values > 0.5,
+    figures = [joint_signal_figure("signals", word, t, values, f"{word} [{word}]", names=words, flagged=values > 0.5,
                                    flag_name=word) for word in words[:1]]
-    figures += [timeline_figure(word, word, (0.0, 0.5), [(word, [(0.1, 0.2)])]) for word in words]
+    figures += [one_figure(word, word, lambda axes: axes.plot([0.0, 1.0], [0.0, 1.0])) for word in words]
 
     def own(drawing: object) -> None:
         axes = drawing.subplots()  # type: ignore[attr-defined]
         axes.set_title(words[0])
         axes.set_ylabel("".join(words[:6]))
 
-    figures.append(Figure("own", words[0], own, alt=words[0]))
+    figures.append(Figure("own", words[0], own))
     table = Table(tuple(words), (tuple(words),), caption=words[0], tones=("bad",))
     sections = [Section(word, (word,), (table,)) for word in words]
     return Report(words[0], words[0], "bad", table, (*sections, Section("figures", figures=tuple(figures))))
