@@ -270,7 +270,7 @@ def report(result: Result) -> Report:
     found = sorted((c for c in result.checks if c.level != "ok"), key=first_to_read)
     levels = Counter(check.level for check in result.checks)
     of_logs = Counter(log.verdict for log in result.logs)
-    told = [
+    worst = [
         (of_logs["reject"] + len(result.rejected), "cannot be used"),
         (of_logs["repair"], "can be used after repair"),
         (of_logs["warn"], "should be looked at"),
@@ -286,7 +286,7 @@ def report(result: Result) -> Report:
         robots=len({log.robot for log in result.logs}),
         found=found,
         levels=levels,
-        told=[(count, words) for count, words in told if count],
+        worst=[(count, words) for count, words in worst if count],
         most=REPORT.findings,
         checks_table=checks_table,
         level_tone=level_tone,

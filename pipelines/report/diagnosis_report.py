@@ -62,11 +62,11 @@ def diagnosis_report(result: Result) -> Report:
     lasting = [one for one in result.findings if find_effect(one.cause).clock != "log"]
     findings = []
     for number, one in enumerate(result.findings, 1):
-        told = finding_context(number, one, result.residual_rms, units, left)
-        told["folded"] = number > _OPEN or not (beyond_chance(one) or number == 1)
-        told["command"] = command([one]) if find_effect(one.cause).clock != "log" else ""
-        told["every"] = command(lasting) if len(lasting) > 1 else ""
-        findings.append(told)
+        context = finding_context(number, one, result.residual_rms, units, left)
+        context["folded"] = number > _OPEN or not (beyond_chance(one) or number == 1)
+        context["command"] = command([one]) if find_effect(one.cause).clock != "log" else ""
+        context["every"] = command(lasting) if len(lasting) > 1 else ""
+        findings.append(context)
     said = " ".join(lines := headlines(result))
     causes = together(result.findings)
     advice = [(what, find_effect(cause).words.remedy) for cause, what in causes]
@@ -129,7 +129,7 @@ def extension_report(result: Extension) -> Report:
 def finding_context(
     number: int, one: Finding, nominal: ResidualRms, units: Units, left: np.ndarray | None = None
 ) -> dict[str, object]:
-    """Return what the template says of a finding.
+    """Return the context of finding.jinja.
 
     Args:
         nominal: residual of the model without any finding, and the floor of the held-out logs.
@@ -154,6 +154,7 @@ def finding_context(
         "imitated": one.torque_rms**2 > 2.0 * rest**2,
         "larger": [(j + 1, torque.before[j], torque.after[j]) for j in np.flatnonzero(larger)],
         "tip": tip_errors(one.gain),
+        "span": sentence("span", one.gain),
         "sure": beyond_chance(one),
         "pair": "" if rival is None
         else f"{words.cause_at(one.cause, one.joint)} {words.cause_at(rival.cause, rival.joint)}",

@@ -135,7 +135,7 @@ def _paragraphs(text: str) -> dict[str, list[str]]:
 
 
 def sentence(macro: str, *values: Any, **named: Any) -> str:
-    """Return the text of a macro of words.jinja as one line."""
+    """Return the text of a macro of words.jinja on a single line."""
     said: str = getattr(template("words.jinja").module, macro)(*values, **named)
     return _on_one_line(said.replace(_PARAGRAPH, " "))
 
@@ -190,7 +190,10 @@ def _read(name: str) -> str:
 
 def _inert(value: Any) -> Any:
     """Return what an expression prints without line breaks and control characters."""
-    return clean(value, None) if isinstance(value, str) else value
+    if not isinstance(value, str):
+        return value
+    before, behind = (" " * end.isspace() for end in (value[:1], value[-1:]))
+    return before + clean(value, None) + behind
 
 
 def _on_one_line(text: str) -> str:

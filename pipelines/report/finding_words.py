@@ -104,10 +104,10 @@ def where(one: Finding, names: Sequence[str] = ()) -> str:
     start = one.parameters.get("start")
     when = start.value if start is not None and isinstance(start.value, int | float) else None
     name = names[one.joint - 1] if one.joint is not None and one.joint <= len(names) else ""
-    told = [
+    details = [
         x for x in (name if name != f"joint {one.joint}" else "", other_joint(one.parameters)) if x
     ]
-    return sentence("where", one.joint, told, when, one.log)
+    return sentence("where", one.joint, details, when, one.log)
 
 
 def how_much(one: Finding) -> str:

@@ -73,8 +73,8 @@ def _strays(far: Sequence[LogResult]) -> dict[str, object] | None:
     noise = float(log.observer.measurement_std[joint - 1])
     limit = float(log.alarm[joint - 1])
     chance = error < REPORT.chance * noise
-    told = {"joint": joint, "name": name, "error": error, "limit": limit, "noise": noise}
-    return told | {"chance": chance, "published": limit == ResultConfig().alarm}
+    context = {"joint": joint, "name": name, "error": error, "limit": limit, "noise": noise}
+    return context | {"chance": chance, "published": limit == ResultConfig().alarm}
 
 
 def _observer(log: LogResult) -> Table:
@@ -100,7 +100,7 @@ def _observer(log: LogResult) -> Table:
 
 
 def _figures(log: LogResult, s: Series) -> list[Figure]:
-    """What is left of the position, and acceleration with its band of two standard deviations."""
+    """The error of the position; acceleration with a band of two standard deviations."""
     name, unit, joints = log.name, joined(log.units), joint_names(len(log.units))
     error = f"{name}: measured minus reconstructed position. It should look like the steps of the "
     error += "encoder, without a trace of the motion."

@@ -58,8 +58,8 @@ def _worst(logs: Sequence[Imitation], tracking: Sequence[Array | None]) -> dict[
     if log.noise_rms is not None and log.noise_rms[joint] > 0.0:
         times = format_number(off / float(log.noise_rms[joint]), 2)
         beside.append(f"{times} times what other noise makes")
-    told = {"log": log, "off": off, "unit": log.units[joint], "joint": joint + 1}
-    return told | {"alike": len(kept), "compared": len(compared), "beside": beside}
+    context = {"log": log, "off": off, "unit": log.units[joint], "joint": joint + 1}
+    return context | {"alike": len(kept), "compared": len(compared), "beside": beside}
 
 
 def _figures(one: Imitation, s: Course) -> list[Figure]:

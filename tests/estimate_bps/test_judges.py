@@ -111,5 +111,5 @@ def test_the_verdict_names_the_worst_joint_and_what_is_small(good: ExperimentLog
     small = tuple(replace(p, value=0.5, std=1.0, visible=True) if k < 2 else replace(p, value=10.0, std=1.0, visible=True)
                   for k, p in enumerate(result.parameters))
     report = bps_report(replace(plain, parameters=small))
-    assert f"{len(small) - 2} of {len(small)} parameters are clearly visible, 2 known to be small" in report.verdict
-    assert [row[3] for row in report.sections[1].tables[0].rows][:3] == ["known to be small", "known to be small", "clearly"]
+    assert f"Identifiability of the {len(small)} parameters: {len(small) - 2} good, 2 negligible." in report.verdict
+    assert [row[3] for row in report.sections[0].tables[0].rows][:3] == ["negligible", "negligible", "good"]

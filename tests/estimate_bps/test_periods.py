@@ -86,7 +86,7 @@ def test_what_the_model_lacks_stands_above_the_floor() -> None:
     assert beside.ratio[0] > 10.0
     assert beside.residual[0] == pytest.approx(0.1, rel=0.3)
     report = bps_report(found)
-    assert f"at most {beside.ratio[0]:.2g} times what the noise between periods leaves ({found.joints[0]})" in report.verdict
+    assert f"at most {beside.ratio[0]:.2g} times the noise floor ({found.joints[0]})" in report.verdict
     assert report.key_figures is not None
     assert any("noise floor" in str(row[0]) for row in report.key_figures.rows)
     assert "Residual beside the noise floor" in [section.title for section in report.sections]

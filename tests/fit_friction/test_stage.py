@@ -109,7 +109,7 @@ def test_the_model_carries_the_friction(outcome: Outcome[Result]) -> None:
 
 def test_the_report_has_its_figures(outcome: Outcome[Result]) -> None:
     names = {path.stem for path in (outcome.folder / "figures").glob("*.svg")}
-    assert {f"curve-{JOINT}", f"fractions-{JOINT}", f"simulation-{JOINT}"} <= names
+    assert {f"curve-{JOINT}", f"simulation-{JOINT}"} <= names
     page = (outcome.folder / "report.html").read_text()
     assert "Table III" in page
     assert "three sigmoid" in page

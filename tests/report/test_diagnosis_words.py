@@ -40,7 +40,7 @@ def test_a_finding_is_told_in_words(cause: str) -> None:
     """Of every effect: no key in what is said of it but in the command that is typed; each number with what it is."""
     told = finding_context(1, found(cause), ResidualRms(*(np.ones(3),) * 3), Units())
     told |= {"folded": False, "command": "", "every": ""}
-    (section,) = sections_of("finding", told=told, words=words, units=Units())
+    (section,) = sections_of("finding", item=told, words=words, units=Units())
     said = " ".join(section.text)
     assert "torque offset at joint 1" in said
     assert KEY.findall(COMMAND.sub("", said)) == []
