@@ -186,7 +186,7 @@ def _draw(figure: Figure, salt: str) -> tuple[str, bytes]:
 
 
 def _texts(artist: Artist) -> Iterator[Text]:
-    """Every text below `artist` but those beside ticks, which the drawing functions make printable."""
+    """Every text below `artist` but those beside ticks, which callers make printable."""
     from matplotlib.axis import Axis
     from matplotlib.text import Text
 
