@@ -38,6 +38,7 @@ class Text:
     """Text files."""
 
     sampled: int = 200  # lines that show the format
+    chunk: int = 20_000  # lines that pandas reads at a time
     head: int = 40  # lines above the numbers that are searched for names
     head_bytes: int = 8192  # in which NUL bytes show UTF-16
     nul_share: float = 0.3  # of NUL bytes in UTF-16

@@ -69,8 +69,8 @@ class RawTable:
             remedy = "export it as numbers, one row a sample, or choose another column"
             raise InputRejected("S12", message, where, remedy)
         every, remedy = [*names, *self.text], "correct the recipe"
-        there = ", ".join(every[: ARRAYS.listed])
-        message = f"no column '{column}'{did_you_mean(column, every)}; there are {there}"
+        message = f"no column '{column}'{did_you_mean(column, every)}; there are "
+        message += ", ".join(every[: ARRAYS.listed])
         if wanted:
             kind = read_name(wanted).quantity
             alike = [name for name in names if read_name(name).quantity == kind]
@@ -92,11 +92,11 @@ def expand(
     """
     why = ""
     if isinstance(columns, str) and "{j}" in columns:
-        name = columns.replace
-        counted = itertools.count(n + 1)
-        have = next(j - 1 for j in counted if name("{j}", str(j)) not in table.columns)
-        why = f"'{name('{j}', str(n + 1))}' is there as well"
-        columns = tuple(name("{j}", str(j)) for j in range(1, have + 1))
+        counted = (columns.replace("{j}", str(j)) for j in itertools.count(1))
+        there = [*itertools.takewhile(lambda name: name in table.columns, counted)]
+        why = f"'{there[-1]}' is there as well" if len(there) > n else ""
+        expected = [columns.replace("{j}", str(j + 1)) for j in range(n)]
+        columns = tuple(there if len(there) > n else expected)
     elif isinstance(columns, str) and columns not in table.columns:
         members = [name for name in table.columns if re.sub(_NUMBERED, "", name) == columns]
         columns = tuple(members) or columns
@@ -108,12 +108,10 @@ def expand(
         raise InputRejected("S02", message, table.source, remedy)
     chosen = tuple((instead or {}).get(j, column) for j, column in enumerate(chosen, start=1))
     names = tuple(table.name_of(c, f"{signal}_{j}") for j, c in enumerate(chosen, start=1))
-    for j, name_j in enumerate(names, start=1):
-        if (first := names.index(name_j) + 1) < j:
-            message = f"column '{name_j}' serves {signal} of joint {first} and of joint {j}"
-            remedy = f"give each joint its own column in signals.{signal}"
-            remedy += f", or by --map {signal}_{j}=…"
-            raise UsageError("C02", message, table.source, remedy)
+    if twice := [name for name, count in Counter(names).items() if count > 1]:
+        message = f"column '{twice[0]}' serves {signal} of two joints"
+        remedy = f"give each joint its own column in signals.{signal}, or by --map {signal}_1=…"
+        raise UsageError("C02", message, table.source, remedy)
     return names
 
 
@@ -183,7 +181,7 @@ def table_of(document: Any, source: str) -> RawTable:
     """
     arrays: dict[str, Anything] = {}
     for name, value in flatten(document):
-        if (array := array_of(value)) is None:
+        if (array := _array_of(value)) is None:
             continue
         if name in arrays:
             message = f"two series are both named '{clean(name, 80)}'"
@@ -206,9 +204,8 @@ def table_of(document: Any, source: str) -> RawTable:
         if matrix.shape[1] > ARRAYS.widest:
             continue
         if rows not in (samples, 1):
-            message = f"'{name}' is stored as {(rows, wide)}, read as {matrix.shape}: time along "
-            words, remedy = f"{message}the long side", "store one row a sample"
-            checks.append(Check.of("S11", "warn", words, source, remedy))
+            message = f"'{name}' is stored as {(rows, wide)}, read with time along the long side"
+            checks.append(Check.of("S11", "warn", message, source, "store one row a sample"))
         short, unit = split_unit(name)
         several = tuple(f"{short}_{j + 1}" for j in range(matrix.shape[1]))
         names = several if several[1:] else (short,)
@@ -226,12 +223,12 @@ def table_of(document: Any, source: str) -> RawTable:
         f"{name} = {' '.join(map(str, array.flat))[: ARRAYS.longest_text]}"
         for name, array in arrays.items()
         if array.size == 1 or (array.dtype.kind == "U" and array.size <= ARRAYS.widest)
-    ]
-    return RawTable(source, columns, np.arange(samples), units, text,
-                    checks=tuple(checks), notes=tuple(notes[: ARRAYS.most_notes]))  # fmt: skip
+    ][: ARRAYS.most_notes]
+    rows_of = np.arange(samples)
+    return RawTable(source, columns, rows_of, units, text, tuple(notes), checks=tuple(checks))
 
 
-def array_of(value: Any) -> Anything | None:
+def _array_of(value: Any) -> Anything | None:
     """Return an array of numbers or of texts; None of anything else."""
     if isinstance(value, np.ndarray):
         return value if value.dtype.kind != "V" else None  # records

@@ -14,7 +14,7 @@ import pytest
 import scipy.io
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.importers.npy import read_npy
+from pipelines.importers.arrays import read_npy
 from pipelines.importers.raw import expand, table_of
 from pipelines.importers.tables import read_table
 from tests.importers.good import good

@@ -164,6 +164,7 @@ def test_f16_a_further_table_below_the_first_is_refused_with_its_line() -> None:
 
 @pytest.mark.parametrize(("first", "second", "seconds"), [
     ("2024-05-17T23:59:59.5Z", "2024-05-19T00:00:00.25Z", 86400.75),
+    ("2024-10-27T02:59:59+02:00", "2024-10-27T02:00:00+01:00", 1.0),
     ("31.05.2024 23:59:59", "01.06.2024 00:00:00", 1.0),
     ("05/31/2024 11:59:59 PM", "06/01/2024 12:00:00 AM", 1.0),
     ("Fri May 17 23:59:59 2024", "Sat May 18 00:00:01 2024", 2.0),
@@ -188,6 +189,14 @@ def test_a_list_that_a_frame_lacks_is_a_missing_sample(spoilt: dict[str, object]
     for j in range(2):
         expected = np.where(np.arange(30) == at, np.nan, (j + 1.0) * np.arange(30))
         assert np.array_equal(table.columns[f"q[{j}]"], expected, equal_nan=True)
+
+
+def test_a_list_of_lists_that_a_frame_lacks_is_a_missing_sample() -> None:
+    frames: list[dict[str, object]] = [{"t": 0.01 * k, "x": [[1.0 * k, 2.0], [3.0, 4.0]]} for k in range(30)]
+    del frames[7]["x"]
+    table = table_of(read_json(json.dumps(frames).encode(), "run.json"), "run.json")
+    assert list(table.columns) == ["t", "x[0][0]", "x[0][1]", "x[1][0]", "x[1][1]"]
+    assert np.flatnonzero(np.isnan(table.columns["x[0][0]"])).tolist() == [7]
 
 
 def test_s03_a_name_twice_in_a_frame_is_refused() -> None:
