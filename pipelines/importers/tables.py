@@ -87,8 +87,8 @@ def read_json(data: bytes, source: str) -> Any:
 def _series(document: Any, source: str) -> Any:
     """Return arrays by name of a document that pandas wrote, or of the longest list of frames."""
     if isinstance(document, dict) and document.keys() >= {"columns", "data"}:
-        columns = zip(document["columns"], zip(*document["data"], strict=True), strict=True)
-        return {name: list(values) for name, values in columns}
+        rows = zip(*document["data"], strict=True)
+        return {k: list(x) for k, x in zip(document["columns"], rows, strict=True)}
     columns = document.values() if isinstance(document, dict) else [None]
     if all(isinstance(x, dict) and all(map(str.isdecimal, x)) for x in columns):
         return {name: list(column.values()) for name, column in document.items()}
@@ -256,7 +256,7 @@ def _in_child(read: Callable[[], RawTable], path: Path, source: str) -> RawTable
 
     def work() -> Answer:
         table = read()
-        about = asdict(replace(table, columns={}, rows=np.zeros(0)))
+        about = asdict(replace(table, columns={}, rows=np.arange(0)))
         del about["rows"]
         columns = {str(i): x for i, x in enumerate(table.columns.values())}
         return Answer(about | {"names": list(table.columns)}, columns)
