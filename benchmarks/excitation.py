@@ -68,8 +68,8 @@ PAPER = (
     "condition",
     "--symmetric",
     "--no-rest",
-    "--set",
-    "design-excitation.speed_share=1",
+    "--speed-share",
+    "1",
 )
 NOISE_SEEDS = 20
 

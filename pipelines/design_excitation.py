@@ -1,8 +1,8 @@
 """Design the experiment that tells most about the arm, within its limits.
 
 Reads    a robot description; optionally a model, earlier logs, a recipe
-Writes   trajectory.h5 (a planned log), controller.csv, coefficients.json, result.json, result.h5,
-         report.html
+Writes   trajectory.h5 (a planned log), controller.csv, both as gentle-… for a first run that is
+         slower, coefficients.json, result.json, result.h5, report.html
 Source   Kostić et al. 2004, Section IV.C.3, eq. (22), Figs. 8 and 9; Swevers et al. 1997
 
 `experiment` plans the other experiments of the workflow instead: logs/<name>.h5, one an experiment.
@@ -19,12 +19,24 @@ from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.named_cause import wanted_cause
 from pipelines.errors import UsageError
 from pipelines.excitation.discrimination import Pair, best, refuse_hidden, refuse_one
+from pipelines.excitation.fourier import Trajectory
 from pipelines.excitation.optimise import Effort
 from pipelines.excitation.other_plans import frf_plans, friction_plans
-from pipelines.excitation.result import Result, doubts, information_of, judged, planned
+from pipelines.excitation.result import (
+    Result,
+    doubts,
+    gentle_log,
+    information_of,
+    judged,
+    planned,
+)
 from pipelines.excitation.result import log_of as planned_log_of
 from pipelines.excitation.task import Wishes, plan_task
-from pipelines.importers.controller import controller_table, write_controller_table
+from pipelines.importers.controller import (
+    ControllerTable,
+    controller_table,
+    write_controller_table,
+)
 from pipelines.importers.recipe import Recipe
 from pipelines.io.files import write_log
 from pipelines.io.model_file import read_model
@@ -56,6 +68,7 @@ class Settings(Wishes):
     evaluations: int | None = option(
         None, "Search so many evaluations instead: repeatable exactly.")
     seed: int = option(1, "Seed of the search.")
+    gentle: float = option(0.5, "Speed of a first run, as a share of the motion's; 1: none.")
     model: str | None = option(
         None, "Model that predicts torque and friction. [the described links]")
     recipe: str | None = option(
@@ -164,13 +177,22 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     t, motion = trajectory.sampled(settings.sample_time)
     log = planned_log_of(task, f"{settings.criterion} excitation", t, motion, "excitation")
     log = replace(log, period=trajectory.series.period if task.rest else None)
-    table = controller_table(given.recipe, task.robot, lambda at: trajectory.at(at)[0].T,
-                             trajectory.duration, settings.sample_time)
+    logs_of_plan, tables = {"trajectory": log}, {"controller": _table(given, settings, trajectory)}
+    if settings.gentle < 1.0:
+        logs_of_plan["gentle-trajectory"] = gentle_log(task, trajectory, settings.gentle)
+        tables["gentle-controller"] = _table(given, settings, trajectory, settings.gentle)
     return replace(
         judged(task, design, apart, settings.seed), criterion=settings.criterion,
         robot_from=given.why, torque_share=settings.torque_share, speed_share=settings.speed_share,
         after=tuple(log.name for log in logs),
-        logs=(("trajectory", log),), table=table)
+        logs=tuple(logs_of_plan.items()), tables=tables)
+
+
+def _table(given: Material, settings: Settings, trajectory: Trajectory,
+           share: float = 1.0) -> ControllerTable:
+    """Return the motion for the controller at a share of its speed."""
+    return controller_table(given.recipe, given.robot, lambda t: trajectory.at(share * t)[0].T,
+                            trajectory.duration / share, settings.sample_time)
 
 
 def _plans(given: Material, settings: Settings, wishes: Wishes) -> Result:
@@ -192,13 +214,15 @@ def _refuse_strange(settings: Settings) -> None:
     positive = {"--time-limit": settings.time_limit, "--evaluations": settings.evaluations,
                 "--cond-max": settings.cond_max, "--periods": settings.periods,
                 "--tip-speed": settings.tip_speed, "sample_time": settings.sample_time,
-                "torque_share": settings.torque_share, "speed_share": settings.speed_share}
+                "--torque-share": settings.torque_share, "--speed-share": settings.speed_share,
+                "--gentle": settings.gentle}
+    shares = ("--torque-share", "--speed-share", "--gentle")
     for where, value in (*positive.items(), *(("noise", one) for one in settings.noise or ())):
         if value is not None and not 0.0 < value < math.inf:
             raise UsageError("C02", f"{value:g} is not positive and finite", where=where,
                              remedy="give a positive number")
-        if value is not None and where.endswith("_share") and value > 1.0:
-            raise UsageError("C02", f"{value:g} of the limits is more than there is", where=where,
+        if value is not None and where in shares and value > 1.0:
+            raise UsageError("C02", f"{value:g} is more than the whole", where=where,
                              remedy="give 1 at most")
     bands = settings.stop_band
     if not all(map(math.isfinite, (*(settings.home or ()), *(settings.tip_box or ()), *bands))):
@@ -232,12 +256,12 @@ def _pair(settings: Settings, robot: RobotDescription) -> Pair | None:
 
 
 def write(result: Result, folder: Path, request: Request) -> None:
-    """Write trajectory.h5, controller.csv and coefficients.json; of other purposes logs/ alone."""
+    """Write planned logs, tables for the controller and coefficients; of other purposes logs/."""
     place = folder if result.purpose == "excitation" else folder / "logs"
     for name, log in result.logs:
         write_log(place / f"{slug(name)}.{request.format}", log)
-    if result.table is not None:
-        write_controller_table(folder / "controller.csv", result.table)
+    for name, table in result.tables.items():
+        write_controller_table(folder / f"{name}.csv", table)
     if result.coefficients is not None:
         text = json_text(result.coefficients)
 

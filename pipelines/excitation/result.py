@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -25,7 +25,7 @@ from pipelines.io.results import NOT_STORED
 from pipelines.writing.task import planned_log
 
 __all__ = ["Course", "DrawnPlan", "ParameterStd", "Result", "coefficients", "doubts",
-           "information_of", "judged", "log_of", "planned"]
+           "gentle_log", "information_of", "judged", "log_of", "planned"]
 
 BLOCK = 4096  # numerics: samples whose rows are computed at once
 
@@ -104,8 +104,10 @@ class Result:
     top_hz: float = 0.0  # [Hz] of the highest harmonic
     robot_from: str = ""  # why this robot, where none was named
     apart: Apart | None = None  # of a design that tells two causes apart
+    turning: tuple[int, ...] = ()  # joints, from 1, that turn by more than a whole turn
     logs: tuple[tuple[str, ExperimentLog], ...] = field(default=(), metadata=NOT_STORED)
-    table: ControllerTable | None = field(default=None, metadata=NOT_STORED)
+    # file name -> its content
+    tables: Mapping[str, ControllerTable] = field(default_factory=dict, metadata=NOT_STORED)
     coefficients: dict[str, object] | None = field(default=None, metadata=NOT_STORED)
 
 
@@ -163,17 +165,36 @@ def judged(task: Task, design: Design, apart: Apart | None, seed: int) -> Result
         course=Course(t, q, dq, ddq, tau),
         period=series.period, periods=trajectory.periods, run_in=trajectory.run_in,
         duration=trajectory.duration, noise=tuple(map(float, goal.noise)),
-        top_hz=float(used[-1] + 1) / series.period, apart=apart,
+        top_hz=float(used[-1] + 1) / series.period, apart=apart, turning=_turning(task, trajectory),
         coefficients=coefficients(task, trajectory))
 
 
+def _turning(task: Task, trajectory: Trajectory) -> tuple[int, ...]:
+    q = trajectory.sampled(task.sample_time)[1][0]
+    pairs = enumerate(zip(task.robot.joints, np.ptp(q, axis=1), strict=True), 1)
+    return tuple(j for j, (joint, way) in pairs if joint.revolute and way > 2.0 * np.pi)
+
+
 def doubts(result: Result) -> tuple[Check, ...]:
-    """Return C08 where a ceiling was not reached."""
-    if result.reached:
-        return ()
-    words = f"a condition number of {result.ceiling:g} was not reached"
-    remedy = "search longer, give more harmonics, or widen the limits that it uses up"
-    return (Check.of("C08", "warn", words, where=result.robot, gate=True, remedy=remedy),)
+    """Return C08 where a ceiling was not reached, or a joint turns right round."""
+    found = []
+    if not result.reached:
+        words = f"a condition number of {result.ceiling:g} was not reached"
+        remedy = "search longer, give more harmonics, or widen the limits that it uses up"
+        found.append(Check.of("C08", "warn", words, result.robot, gate=True, remedy=remedy))
+    for joint in result.turning:
+        words = f"joint {joint} turns by more than a whole turn"
+        remedy = "see that its cables allow it, or describe its position limits"
+        found.append(Check.of("C08", "warn", words, result.robot, remedy=remedy))
+    return tuple(found)
+
+
+def gentle_log(task: Task, trajectory: Trajectory, share: float) -> ExperimentLog:
+    """Return the planned log of the same path at `share` of the speed: q(s t), s q̇, s² q̈."""
+    count = round(trajectory.duration / share / task.sample_time) + 1
+    t = task.sample_time * np.arange(count, dtype=np.float64)
+    motion = trajectory.at(share * t) * np.array([1.0, share, share**2])[:, None, None]
+    return log_of(task, "gentle first run", t, motion, "free")
 
 
 def log_of(task: Task, name: str, t: Array, motion: Array, experiment: str) -> ExperimentLog:

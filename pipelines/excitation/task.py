@@ -51,8 +51,9 @@ class Wishes:
         None, "Count columns of friction as well. [on every arm but the RRR arm]",
         "--friction/--no-friction")
     noise: tuple[float, ...] | None = None  # [N m] std of the torque; None: 1 % of its limit
-    torque_share: float = 0.9  # of the torque limit that the plan may use
-    speed_share: float = 0.95  # of the speed limit: a loop overshoots by up to 4 %
+    torque_share: float = option(0.9, "Share of the torque limits that the motion may use.")
+    # a loop overshoots by up to 4 %
+    speed_share: float = option(0.95, "Share of the speed limits that the motion may use.")
     tip_speed: float | None = option(None, "Limit on the speed of the tip [m/s].")
     tip_box: tuple[float, ...] | None = option(
         None, "Box for the tip [m]: x from,to, y from,to, z from,to.")

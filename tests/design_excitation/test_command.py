@@ -80,6 +80,24 @@ def test_the_files_agree(plain: Outcome[Result], tmp_path: Path) -> None:
     assert [check for check in examined.checks if check.level in ("reject", "repair")] == []
 
 
+def test_the_first_run_is_the_same_path_at_half_the_speed(plain: Outcome[Result]) -> None:
+    """q(t/2): half the speed, a quarter of the acceleration, twice the time; as a log and as a table."""
+    whole, gentle = (open_log(plain.folder / f"{name}.h5").log for name in ("trajectory", "gentle-trajectory"))
+    assert gentle.t[-1] == pytest.approx(2.0 * whole.t[-1])
+    for name, share in (("q_ref", 1.0), ("dq_ref", 0.5), ("ddq_ref", 0.25)):
+        np.testing.assert_allclose(gentle[name][::2], share * whole[name], atol=1e-9)
+    table = np.loadtxt(plain.folder / "gentle-controller.csv", delimiter=",", skiprows=1)
+    np.testing.assert_allclose(table, np.column_stack([gentle.t, gentle["q_ref"]]), atol=1e-12)
+
+
+def test_a_joint_that_turns_right_round_is_warned_of(tmp_path: Path) -> None:
+    """Joints of the shipped arm have no position limits: at a tenth of the frequency they wind up their cables."""
+    slow = designed(tmp_path / "slow", replace(QUICK, frequency=0.02))
+    wound = [joint for joint, q in enumerate(open_log(slow.folder / "trajectory.h5").log["q_ref"].T, 1) if np.ptp(q) > 2 * np.pi]
+    assert wound
+    assert [check.message.split()[1] for check in slow.checks if "whole turn" in check.message] == [str(j) for j in wound]
+
+
 def test_the_table_comes_back_through_its_recipe(tmp_path: Path) -> None:
     """Motor side, coupled, in degrees, of other order, sign and scale, at another rate: importing it gives the motion."""
     from pipelines.import_log import STAGE as IMPORT
