@@ -10,7 +10,6 @@ import numpy as np
 from pipelines.diagnosis.answer import WEAKER
 from pipelines.diagnosis.result import (
     DetectionLimit,
-    Diagnosis,
     Extension,
     Finding,
     Gain,
@@ -27,7 +26,7 @@ from pipelines.report.document import capital, document, sentence
 from pipelines.report.finding_words import beyond_chance, headlines, of_any_size, where
 from pipelines.report.report import Report, Table, Tone, columns_table
 from pipelines.report.sections import checks_table, with_card
-from pipelines.report.style import format_number, format_unit
+from pipelines.report.style import format_number
 from pipelines.report.words import Units, named, title_of, together, units_in
 
 _CANDIDATES = 40  # numerics: lines
@@ -40,20 +39,8 @@ _TONES: dict[str, Tone] = {
     "unknown": "attention",
     "cannot-judge": "attention",
 }
-# What of a cause's shape a technician can use; the rest is the form of its law.
-_AT = {
-    "order": "order {size}",
-    "from_joint": "from joint {size}",
-    "with_joint": "with joint {size}",
-    "link": "of link {size}",
-    "speed": "speed {size} {unit}",
-    "distance": "travel {size} {unit}",
-    "time_constant": "time constant {size} {unit}",
-    "duration": "lasting {size} {unit}",
-    "frequency": "{size} {unit}",
-    "gap": "free play {size} {unit}",
-    "limit": "at {size} {unit}",
-}
+# what of a cause's shape a technician can use; the rest is the form of its law
+_AT = ("order", "from_joint", "with_joint", "link", "speed", "distance", "duration", "frequency")
 
 
 def diagnosis_report(result: Result) -> Report:
@@ -91,8 +78,7 @@ def diagnosis_report(result: Result) -> Report:
         limits=detection_limits(result.detection_limits, len(result.residual_rms.identify)),
         thresholds=_thresholds(result),
         evidence=[(one, evidence_figures(one, k, units)) for k, one in enumerate(result.evidence)],
-        above_floor=above_floor,
-        rated=result.rated,
+        rated=[x if math.isfinite(x) else None for x in result.rated],
         units=units,
     )
     return with_card(report, result.boundary, first=result.verdict != "cause")
@@ -310,33 +296,6 @@ def _smallest(one: DetectionLimit) -> str:
     if isinstance(value, float) and ends and not one.or_less and value >= min(ends):
         return "cannot be seen"
     shown = format_number(value, 2) if isinstance(value, float) else words.format_value(one.minimum)
-    at = "or less" if one.or_less else ", ".join(
-        _AT[name].format(size=format_number(x.value, 3), unit=format_unit(x.unit))
-        for name, x in one.at.items() if name in _AT and isinstance(x.value, int | float)
-    )  # fmt: skip
-    return f"{shown} ({at})" if at else shown
-
-
-def above_floor(found: Diagnosis, number: int, rated: Sequence[float], units: Units) -> Table:
-    """The residual of each joint beside its floor, and which signals it follows."""
-    one, residual = found.evidence[number], found.residual_rms
-    columns: dict[str, list[object]] = {"joint": []}
-    for j in range(len(one.above_noise_floor)):
-        own = sorted((c for c in one.curves if c.joint == j + 1), key=lambda c: -c.explained)
-        share = 100.0 * residual.identify[j] / rated[j] if j < len(rated) else math.nan
-        known = np.isfinite(one.band[j]).all()
-        band = " to ".join(format_number(float(end), 2) for end in one.band[j]) if known else None
-        row = {
-            "joint": j + 1,
-            f"residual, rms [{units.torque}]": float(residual.identify[j]),
-            "residual [% of rated]": float(share) if share else None,
-            f"noise floor [{units.torque}]": float(residual.noise_floor[j]),
-            "power above the floor [%]": 100.0 * float(one.above_noise_floor[j]),
-            "mostly at [Hz]": band,
-            "follows most": ", ".join(
-                f"{c.against} ({100.0 * c.explained:.0f} %)" for c in own[:3]
-            ),
-        }
-        for name, cell in row.items():
-            columns.setdefault(name, []).append(cell)
-    return columns_table(columns)  # type: ignore[arg-type]
+    at = ["or less"] if one.or_less else []
+    at += [words.format_values([(name, one.at[name])]) for name in _AT if name in one.at]
+    return f"{shown} ({', '.join(at)})" if at else shown

@@ -16,7 +16,6 @@ from pipelines.report.document import document
 from pipelines.report.figures import DASHED, Array, envelope, joint_signal_figure, rows_figure
 from pipelines.report.report import Figure, Report, Tone
 from pipelines.report.sections import NO_COLLISION_CHECK
-from pipelines.report.style import format_number
 from pipelines.report.words import unit_of, without_keys
 
 if TYPE_CHECKING:
@@ -45,7 +44,6 @@ def excitation_report(result: Result) -> Report:
         much=REPORT.much,
         apart=apart,
         causes=() if apart is None else tuple(map(without_keys, apart.causes)),
-        similarity=_similarity,
         rivals=rivals,
         alike=REPORT.alike,
         near=REPORT.near_bound,
@@ -56,15 +54,6 @@ def excitation_report(result: Result) -> Report:
 def _are_rivals(found: Apart | None) -> bool:
     """Return whether a diagnosis of the log would call the two causes alternatives."""
     return found is not None and found.after.similarity > REPORT.alike
-
-
-def _similarity(similarity: float) -> str:
-    """With as many digits as it takes to be on its own side of what makes alternatives."""
-    for digits in (2, 3):
-        shown = float(f"{similarity:.{digits}g}")
-        if shown != REPORT.alike and (shown > REPORT.alike) == (similarity > REPORT.alike):
-            return format_number(similarity, digits)
-    return format_number(similarity, 4)
 
 
 def _figures(result: Result) -> list[Figure]:

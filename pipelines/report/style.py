@@ -7,12 +7,9 @@ can be read as mark-up.
 
 from __future__ import annotations
 
-import atexit
 import logging
 import math
-import os
 import re
-import tempfile
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -20,7 +17,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from pipelines.errors import clean
-from pipelines.io.output import remove_folder, staging_folder
 
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
@@ -127,37 +123,11 @@ def _raised(exponent: int) -> str:
 
 
 def log_ticks(axis: Axis) -> None:
-    """Label powers of ten on a logarithmic axis as plain text; matplotlib's own are formulas.
+    """Label a logarithmic axis in plain text; between powers of ten where few are in view."""
+    from matplotlib.ticker import LogFormatter
 
-    Where fewer than two of them are in view, so that no scale could be read, what lies between is
-    labelled: twice and five times a power of ten, or every whole multiple.
-    """
-    from matplotlib.ticker import FuncFormatter
-
-    def in_view(multiple: int = 1) -> int:
-        """How many of `multiple` times a power of ten are in view."""
-        low, high = sorted(axis.get_view_interval())
-        if low <= 0.0:
-            return 0
-        first = math.ceil(math.log10(low / multiple) - 1e-9)
-        return math.floor(math.log10(high / multiple) + 1e-9) - first + 1
-
-    def label(value: float, _position: int | None = None) -> str:
-        if 1.0 <= value < 1e4:
-            return format_number(int(value))
-        if in_view() < 2:
-            return format_number(value, 1)
-        return f"10{_raised(round(math.log10(value)))}"
-
-    def between(value: float, _position: int | None = None) -> str:
-        if in_view() >= 2:
-            return ""
-        wanted = (2, 5) if sum(map(in_view, (1, 2, 5))) >= 2 else range(2, 10)
-        multiple = round(value / 10.0 ** math.floor(math.log10(value)))
-        return format_number(float(f"{value:.1g}"), 1) if multiple in wanted else ""
-
-    axis.set_major_formatter(FuncFormatter(label))
-    axis.set_minor_formatter(FuncFormatter(between))
+    axis.set_major_formatter(LogFormatter())
+    axis.set_minor_formatter(LogFormatter(minor_thresholds=(2.0, 0.7)))
 
 
 @contextmanager
@@ -168,7 +138,7 @@ def figure_style(salt: str) -> Iterator[None]:
         salt: makes the identifiers in the SVG of one figure differ from those of the next, and
             equal on every run.
     """
-    prepare_matplotlib()
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where it may not write, say
     import matplotlib
 
     with matplotlib.rc_context(), warnings.catch_warnings():
@@ -179,32 +149,3 @@ def figure_style(salt: str) -> Iterator[None]:
         matplotlib.rcParams.update(own)
         matplotlib.rcParams["svg.hashsalt"] = salt
         yield
-
-
-def prepare_matplotlib() -> None:
-    """Before its first import: give matplotlib a folder to write to, silence its remarks."""
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)
-    if "MPLCONFIGDIR" in os.environ or _writable_home():
-        return
-    folder = staging_folder(Path(tempfile.gettempdir()) / "rrrid")
-    atexit.register(remove_folder, folder)
-    os.environ["MPLCONFIGDIR"] = str(folder)
-
-
-def _writable_home() -> bool:
-    try:
-        home = Path.home()
-    except RuntimeError:  # no HOME and no entry for this user
-        return False
-    folders = [
-        Path(os.environ.get(name) or home / below) / "matplotlib"
-        for name, below in (("XDG_CONFIG_HOME", ".config"), ("XDG_CACHE_HOME", ".cache"))
-    ]
-    return all(map(_can_be_made, folders))
-
-
-def _can_be_made(folder: Path) -> bool:
-    nearest = next(
-        path for path in (folder, *folder.parents) if os.path.exists(path)
-    )  # Path.exists raises where it may not look
-    return nearest.is_dir() and os.access(nearest, os.W_OK)

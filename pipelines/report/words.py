@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from pipelines.diagnosis.result import Diagnosis, Extension, Finding, Rejected, Value
 from pipelines.dynamics.parameter_names import named_in, numbered, part_of
@@ -21,6 +21,9 @@ from pipelines.estimation.preparation import FewerTerms
 from pipelines.report.document import capital, sentence
 from pipelines.report.finding_words import other_joint
 from pipelines.report.style import enumerated, format_unit, unit_in_words, with_std
+
+if TYPE_CHECKING:
+    from pipelines.excitation.result import Peak
 
 _COUNTED = ("second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 _KEY = re.compile(r"\b([a-z]+(?:_[a-z]+)*)(?::(\d+)(?::([a-z]+(?:_[a-z]+)*))?)?\b")
@@ -206,18 +209,7 @@ def joined(units: Iterable[str], otherwise: str = "") -> str:
     return " or ".join(dict.fromkeys(units)) or otherwise
 
 
-class Limited(Protocol):
-    """An object with the unit of a quantity of a joint: a limit, or a distance to it."""
-
-    @property
-    def quantity(self) -> str: ...  # "position" | "speed" | "acceleration" | "torque" | of the tip
-    @property
-    def joint(self) -> int | None: ...
-    @property
-    def unit(self) -> str: ...
-
-
-def unit_of(limits: Iterable[Limited], quantity: str) -> str:
+def unit_of(limits: Iterable[Peak], quantity: str) -> str:
     """Of a quantity of the joints, "rad" or "rad or m"; that of a turning joint without limits."""
     units = (one.unit for one in limits if one.quantity == quantity and one.joint is not None)
     return joined(units, _TURNING[quantity])

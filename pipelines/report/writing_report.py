@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
@@ -21,7 +20,7 @@ from pipelines.report.figures import (
 )
 from pipelines.report.report import Figure, Report, Tone
 from pipelines.report.sections import NO_COLLISION_CHECK
-from pipelines.report.style import format_number
+from pipelines.report.style import format_number, with_std
 from pipelines.report.words import joined
 from pipelines.writing.control_cases import Case
 from pipelines.writing.task import Designed
@@ -70,16 +69,14 @@ def _mm(x: float) -> str:
 
 
 def _spread(one: Case) -> list[str]:
-    """Tip error of each axis, [mm] with three digits, and the spread with one where it shows."""
+    """Tip error of each axis with its spread. [mm]"""
     spread = one.tip_error_std_spread
-    found = []
-    for k, x in enumerate(one.tip_error_std.values):
-        decimals = max(0, 2 - math.floor(math.log10(1e3 * x))) if x > 0.0 else 0
-        own = 0.0 if spread is None else 1e3 * spread.values[k]
-        found.append(
-            f"{1e3 * x:.{decimals}f}" + (f" ± {format_number(own, 1)}" if own >= 5e-5 else "")
-        )
-    return found
+    stds = (None,) * 3 if spread is None else spread.values
+    pairs = zip(one.tip_error_std.values, stds, strict=True)
+    return [
+        format_number(1e3 * x, 3) if std is None else with_std(1e3 * x, 1e3 * std)
+        for x, std in pairs
+    ]
 
 
 def _gain(first: Case | None, one: Case) -> str:
