@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from functools import cache
 from pathlib import Path
 from typing import Final
 
 from pipelines.errors import Check, Level
+from pipelines.io.sandbox import parse_toml, read_small_text
 
 __all__ = ["codes", "first_to_read", "title_of"]
 
@@ -17,7 +17,7 @@ _WORST_FIRST: Final[tuple[Level, ...]] = ("reject", "repair", "warn", "ok")
 @cache
 def codes() -> dict[str, str]:
     """Return the words of every code."""
-    return tomllib.loads(Path(__file__).with_name("codes.toml").read_text(encoding="utf-8"))
+    return parse_toml(read_small_text(Path(__file__).with_name("codes.toml")))
 
 
 def first_to_read(check: Check) -> tuple[bool, bool, int, int]:

@@ -23,7 +23,7 @@ from pipelines.report.finding_words import other_joint
 from pipelines.report.style import enumerated, format_unit, unit_in_words, with_std
 
 if TYPE_CHECKING:
-    from pipelines.excitation.result import Peak
+    from pipelines.excitation.verify import Peak
 
 _COUNTED = ("second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 _KEY = re.compile(r"\b([a-z]+(?:_[a-z]+)*)(?::(\d+)(?::([a-z]+(?:_[a-z]+)*))?)?\b")
