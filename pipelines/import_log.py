@@ -1,7 +1,7 @@
 """Import recordings: CSV, JSON, MAT, NumPy and Parquet files become logs.
 
 Reads    a recipe (TOML, `pipelines.importers.recipe`) and the recorded files its patterns match
-Writes   logs/<name>.h5 or .parquet, tables/<name>.parquet (maps), result.json, report.html
+Writes   logs/<name>.h5 or .parquet, result.json, report.html
 Source   log-format.md; transmission and torque constants as `pipelines.importers.units` says
 
 A log whose samples were altered (repaired, unwrapped, resampled) is a derived log. Its attribute
@@ -12,32 +12,24 @@ that hour.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import Check, Gathering, UsageError
 from pipelines.estimation.grids import grid, resample
-from pipelines.importers.assemble import Material, collect, parse_map
-from pipelines.importers.config import REPAIR
+from pipelines.importers.collect import Material, collect
 from pipelines.importers.guess import Draft, guess_recipe
 from pipelines.importers.links import TorqueModel
-from pipelines.importers.make_log import ImportedTable, Made, SourceFile, import_table, logs_of
-from pipelines.importers.patterns import fill, unique
+from pipelines.importers.make_log import ImportedLog, logs_of, parse_map
 from pipelines.io.files import write_log
-from pipelines.io.log import ExperimentLog
 from pipelines.io.option import option
-from pipelines.io.parquet import write_table
-from pipelines.io.results import NOT_STORED
 from pipelines.io.robot import RobotDescription
 from pipelines.io.sandbox import regular_file
-from pipelines.io.schema import Array
 from pipelines.quality.subject import many
-from pipelines.report.figures import joint_signal_figure
-from pipelines.report.report import Figure, Report, Section, Table
+from pipelines.report.report import Report, Section, Table
 from pipelines.stage import Inputs, Request, Stage, slug
 
 
@@ -71,46 +63,12 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Preview:
-    """Every Nth sample of a log, for the report's figure: one short text a column.
-
-    In a result.h5 they would lie among logs of the same ending, and one line a number would make
-    most of result.json.
-    """
-
-    t: str  # [s]
-    q: tuple[str, ...]  # [rad] one a joint
-    tau: tuple[str, ...]  # [N m] one a joint
-
-
-@dataclass(frozen=True)
-class ImportedLog:
-    """One log: what it is, where it came from, what was done to it."""
-
-    name: str
-    file: str
-    experiment: str
-    role: str
-    joint: int | None
-    samples: int
-    joints: int
-    sample_time: float  # [s]
-    duration: float  # [s]
-    sources: tuple[SourceFile, ...]
-    steps: tuple[str, ...]  # units, signs, transmission
-    altered: tuple[str, ...]  # repairs, unwrapping, resampling: what makes it a derived log
-    preview: Preview | None  # of the first logs
-    log: ExperimentLog = field(metadata=NOT_STORED, repr=False)
-
-
-@dataclass(frozen=True)
 class Result:
-    """The logs and tables of an import."""
+    """The logs of an import."""
 
     recipe: str
     robot: str
     logs: tuple[ImportedLog, ...]
-    tables: tuple[ImportedTable, ...]
     ignored: tuple[str, ...]  # files below the source folder that the recipe does not speak of
     checks: tuple[Check, ...]
 
@@ -141,74 +99,52 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     """
     material: Material = inputs.material
     mapped = parse_map(settings.map, material.recipe, material.robot.n_joints)
-    checks, made, problems = list(material.robot.checks), list[Made](), Gathering()
-    trust = settings.trust_units
+    checks, made, problems = list(material.robot.checks), list[ImportedLog](), Gathering()
     for source in material.sources:
         with problems.part():
-            made += logs_of(source, material, mapped, trust, (grid, resample), checks)
+            resampling = grid, resample
+            made += logs_of(source, material, mapped, settings.trust_units, resampling, checks)
     problems.raise_all()
-    names = unique(item.log.name for item in made)
-    paths = unique(slug(name) for name in names)
-    logs: list[ImportedLog] = []
-    for item, name, stem in zip(made, names, paths, strict=True):
-        log = item.log
-        logs.append(
-            ImportedLog(
-                name=name,
-                file=f"logs/{stem}.{material.ending}",
-                experiment=log.experiment,
-                role=log.role,
-                joint=log.joint,
-                samples=log.n_samples,
-                joints=log.n_joints,
-                sample_time=log.sample_time,
-                duration=float(log.t[-1] - log.t[0]),
-                sources=item.files,
-                steps=tuple(item.done.steps),
-                altered=tuple(item.done.altered),
-                preview=_preview(log) if len(logs) < REPAIR.previews else None,
-                log=replace(log, name=name),
-            )
+    names = _unique(item.name for item in made)
+    stems = _unique(slug(name) for name in names)
+    logs = tuple(
+        replace(
+            item, name=name, file=f"logs/{stem}.{material.ending}", log=replace(item.log, name=name)
         )
-    tables = []
-    for spec, groups, table in material.tables:
-        checks += table.checks
-        name = fill(spec.name, groups, material.recipe.where)
-        tables.append(import_table(spec, name, f"tables/{slug(name)}.parquet", table))
-    about_recipe = (material.recipe_path.name, material.robot.name)
+        for item, name, stem in zip(made, names, stems, strict=True)
+    )
     said = tuple(dict.fromkeys(checks))
-    return Result(*about_recipe, tuple(logs), tuple(tables), material.ignored, said)
+    return Result(material.recipe_path.name, material.robot.name, logs, material.ignored, said)
 
 
-def _preview(log: ExperimentLog) -> Preview:
-    every = max(1, -(-log.n_samples // REPAIR.preview_points))
-
-    def words(values: Array, digits: int = 4) -> str:
-        return " ".join(f"{x:.{digits}g}" for x in values[::every].tolist())
-
-    return Preview(words(log.t, 6), tuple(map(words, log.q.T)), tuple(map(words, log.tau.T)))
+def _unique(names: Iterable[str]) -> tuple[str, ...]:
+    """Return the names, those that occur twice numbered."""
+    taken: dict[str, None] = {}
+    for name in names:
+        fresh, number = name, 2
+        while fresh in taken:
+            fresh, number = f"{name}-{number}", number + 1
+        taken[fresh] = None
+    return tuple(taken)
 
 
 def write(result: Result, folder: Path, request: Request) -> None:
-    """Write logs and tables into `folder`."""
+    """Write the logs into `folder`."""
     for item in result.logs:
         request.tell(f"writing {item.file}")
         write_log(folder / item.file, item.log)
-    for table in result.tables:
-        write_table(folder / table.file, table.data, table.units)
 
 
 def report(result: Result) -> Report:
-    """Report what was written and what was done to the samples."""
-    logs, tables, n = result.logs, result.tables, len(result.logs)
+    """Report what was written and what was done to the samples; `rrrid inspect` draws the logs."""
+    logs, n = result.logs, len(result.logs)
     repaired = sum(c.level == "repair" for c in result.checks)
     warned = sum(c.level == "warn" for c in result.checks)
     resampled = [i for i in logs if any(step.startswith("resampled ") for step in i.altered)]
     words = f"{many(n, 'log')} of robot {result.robot} imported, "
-    words += f"{sum(item.duration for item in logs):.4g} s in all"
-    words += f", and {many(len(tables), 'table')}" if tables else ""
-    words += f"; {many(repaired, 'repair')}, listed below" if repaired else ""
-    words += "" if repaired else "; nothing had to be repaired"
+    words += f"{sum(item.duration for item in logs):.4g} s in all; "
+    words += f"{many(repaired, 'repair')}, listed below" if repaired else ""
+    words += "" if repaired else "nothing had to be repaired"
     if resampled:
         rates = ", ".join(dict.fromkeys(f"{1.0 / item.sample_time:g} Hz" for item in resampled))
         some = "all" if len(resampled) == n > 1 else many(len(resampled), "log")
@@ -219,42 +155,23 @@ def report(result: Result) -> Report:
         (i.name, i.experiment, i.role, i.joint, i.samples, 1.0 / i.sample_time, i.duration)
         for i in logs
     ]
-    drawn = f"Drawn are the first {REPAIR.previews} of {n} logs; rrrid inspect draws more."
-    text = (drawn,) if n > REPAIR.previews else ()
-    figures = tuple(f for item in logs if item.preview for f in _figures(item, item.preview))
-    sections = [Section("Logs", text, tables=(Table(head, tuple(rows)),), figures=figures)]
-    if tables:
-        names = ("table", "from", "columns", "rows")
-        units = [", ".join(f"{c} [{unit}]" for c, unit in t.units.items()) for t in tables]
-        rows = [(t.name, t.source, x, t.rows) for t, x in zip(tables, units, strict=True)]
-        text = ("Files without a clock are no logs; they are kept as tables in SI.",)
-        sections.append(Section("Tables", text, (Table(names, tuple(rows)),)))
-    rows = []
+    treated = []
     for item in logs:
         steps = "; ".join((*item.steps, *item.altered)) or "taken as they are"
-        rows.append((item.name, ", ".join(s.name for s in item.sources), steps))
-    treated = [Table(("log", "from", "done to the samples"), tuple(rows))]
+        treated.append((item.name, ", ".join(s.name for s in item.sources), steps))
+    tables = [Table(("log", "from", "done to the samples"), tuple(treated))]
     said = [c for c in result.checks if c.level != "ok"]
     if found := tuple((c.code, c.level, c.where, c.message, c.remedy) for c in said):
-        treated.append(Table(("code", "level", "where", "what", "remedy"), found))
+        tables.append(Table(("code", "level", "where", "what", "remedy"), found))
     by = [f"By recipe {result.recipe}."]
     if listed := ", ".join(result.ignored[:8]):
         more, files = " …" if result.ignored[8:] else "", many(len(result.ignored), "file")
         by.append(f"The recipe does not speak of {files}: {listed}{more}.")
-    sections.append(Section("What was done to the data", tuple(by), tuple(treated)))
-    said_any = repaired or warned
-    return Report("Import", words, "attention" if said_any else "good", sections=tuple(sections))
-
-
-def _figures(item: ImportedLog, preview: Preview) -> tuple[Figure, Figure]:
-    def figure(name: str, texts: tuple[str, ...], unit: str) -> Figure:
-        values = np.array([text.split() for text in (preview.t, *texts)], dtype=np.float64).T
-        caption = f"{item.name}: {name} of each joint as it is in the log."
-        return joint_signal_figure(
-            f"{name}-{slug(item.name)}", caption, values[:, 0], values[:, 1:], f"{name} [{unit}]"
-        )
-
-    return figure("position", preview.q, "rad"), figure("torque", preview.tau, "N m")
+    sections = (
+        Section("Logs", tables=(Table(head, tuple(rows)),)),
+        Section("What was done to the data", tuple(by), tuple(tables)),
+    )
+    return Report("Import", words, "attention" if repaired or warned else "good", sections=sections)
 
 
 def _checks(result: Result) -> tuple[Check, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from pipelines.errors import UsageError
 from pipelines.importers.recipe import Recipe
 from pipelines.importers.repair import Recording
-from pipelines.importers.units import drive_of, joint_side, own_units, units_of_recipe
+from pipelines.importers.units import declared_units, drive_of, joint_side, own_units
 from pipelines.io.log import Array
 from pipelines.io.output import write_file
 from pipelines.io.parquet import csv_cell
@@ -55,7 +55,7 @@ def controller_table(
         if spec is None:
             message, remedy = "the recipe has no signal q", "give a recipe that imports positions"
             raise UsageError("C02", message, recipe.where, remedy)
-        units = units_of_recipe("q", spec, robot, recipe.where)[0] if spec.unit else units
+        units = declared_units("q", spec, robot, recipe.where)[0] if spec.unit else units
         # q = q_recorded A + b, of which zeros and a quarter of each unit vector show b and A.
         probe = 0.25 * np.eye(n + 1, n, -1)
         rows = np.arange(n + 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from pipelines.errors import EnvironmentFault, InputRejected, UsageError
@@ -29,22 +29,16 @@ def _compiled(pattern: str) -> re.Pattern[str]:
     if len(pattern) > RECIPE.longest_pattern:
         message = f"a pattern of {len(pattern)} characters"
         raise UsageError("C02", message, "match", f"write at most {RECIPE.longest_pattern}")
-    shell = ((r"\*\*", ".*"), (r"\*", "[^/]*"), (r"\?", "[^/]"))
-    expression, seen = "", set[str]()
-    for k, part in enumerate(_FIELD.split(pattern)):
-        if k % 3 == 0:
-            text = re.escape(part)
-            for sign, meaning in shell:
-                text = text.replace(sign, meaning)
-            expression += text
-        elif k % 3 == 1:
-            name = part
-        else:
-            group = f"(?P={name})" if name in seen else f"(?P<{name}>{part or '[^/]+?'})"
-            expression += group
-            seen.add(name)
+    plain, *fields = _FIELD.split(pattern)
+    expression, seen = re.escape(plain), set[str]()
+    for name, given, text in zip(fields[::3], fields[1::3], fields[2::3], strict=True):
+        group = f"(?P={name})" if name in seen else f"(?P<{name}>{given or '[^/]+?'})"
+        expression += group.replace("\\", "\0") + re.escape(text)
+        seen.add(name)
+    for sign, meaning in ((r"\*\*", ".*"), (r"\*", "[^/]*"), (r"\?", "[^/]")):
+        expression = expression.replace(sign, meaning)
     try:
-        return re.compile(expression)
+        return re.compile(expression.replace("\0", "\\"))
     except re.error as problem:
         message = f"pattern '{pattern}': {problem}"
         remedy = "write {name}, or {name:regular expression}"
@@ -61,32 +55,28 @@ def matches(
     Raises:
         UsageError: C02, a pattern is invalid, or takes too long.
     """
-    flat = [pattern for patterns in every for pattern in each(patterns)]
     compiled = [[_compiled(pattern) for pattern in each(patterns)] for patterns in every]
 
     def work() -> list[dict[str, dict[str, str]]]:
-        fits = [{name: _groups(some, name) for name in names} for some in compiled]
-        return [{k: groups for k, groups in fit.items() if groups is not None} for fit in fits]
+        found = []
+        for some in compiled:
+            hits = {
+                name: next(filter(None, (x.fullmatch(name) for x in some)), None) for name in names
+            }
+            found.append({name: {"stem": Path(name).stem} | hit.groupdict(default="")
+                          for name, hit in hits.items() if hit})  # fmt: skip
+        return found
 
+    flat = [pattern for patterns in every for pattern in each(patterns)]
     if all(":" not in p and len(re.findall(r"\{|\*+", p)) <= RECIPE.simple for p in flat):
         return work()
     try:
-        found = guarded(
-            lambda: Answer({"found": work()}, {}),
-            where,
-            seconds=RECIPE.seconds,
-            memory=RECIPE.memory,
-        )
+        limits = {"seconds": RECIPE.seconds, "memory": RECIPE.memory}
+        return list(guarded(lambda: Answer({"found": work()}, {}), where, **limits).about["found"])
     except InputRejected:
         message = f"a pattern takes more than {RECIPE.seconds:.0f} s: {', '.join(flat)}"
         remedy = "write fewer wildcards, and no repetition inside another, such as (a+)+"
         raise UsageError("C02", message, where, remedy) from None
-    return list(found.about["found"])
-
-
-def _groups(compiled: Sequence[re.Pattern[str]], relative: str) -> dict[str, str] | None:
-    found = next((x for x in (one.fullmatch(relative) for one in compiled) if x), None)
-    return {"stem": Path(relative).stem} | found.groupdict(default="") if found else None
 
 
 def fill(template: str, groups: Mapping[str, str], where: object) -> str:
@@ -133,14 +123,3 @@ def inside(folder: Path, relative: str, where: object) -> Path:
         message = f"'{relative}' lies outside the source folder"
         raise UsageError("X11", message, where, "keep the files of a recording together")
     return folder / relative
-
-
-def unique(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the names, those that occur twice numbered."""
-    taken: dict[str, None] = {}
-    for name in names:
-        fresh, number = name, 2
-        while fresh in taken:
-            fresh, number = f"{name}-{number}", number + 1
-        taken[fresh] = None
-    return tuple(taken)

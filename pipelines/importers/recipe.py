@@ -19,7 +19,7 @@ The shortest recipe, one log a file, everything SI:
     tau = { columns = ["m1", "m2", "m3"], unit = "N m" }
 
 Everything else is written only where it differs: `[[file]]` cases, `[drive]`, `[resample]`,
-`[missing]`, `[format]`, `[controller]` and `[[table]]`. The fields of the dataclasses below are the
+`[missing]`, `[format]` and `[controller]`. The fields of the dataclasses below are the
 keys, their comments the meaning. Samples go through: missing values -> repairs of time -> unwrap ->
 scale, sign, unit -> torque constant -> transmission -> offset -> resampling.
 """
@@ -185,27 +185,6 @@ class ControllerSpec:
 
 
 @dataclass(frozen=True)
-class ColumnSpec:
-    """A column of a `[[table]]`."""
-
-    __pydantic_config__ = _STRICT
-    column: str | int
-    unit: str | None = None
-    counts_per_rev: float | None = None
-    scale: float = 1.0
-
-
-@dataclass(frozen=True)
-class TableSpec:
-    """`[[table]]`: files without a clock (maps, calibrations), kept as Parquet tables."""
-
-    __pydantic_config__ = _STRICT
-    match: Texts
-    columns: dict[str, ColumnSpec]
-    name: str = "{stem}"
-
-
-@dataclass(frozen=True)
 class Recipe:
     """A whole recipe, checked."""
 
@@ -220,14 +199,13 @@ class Recipe:
     missing: MissingSpec = MissingSpec()
     format: TextFormat = field(default_factory=TextFormat)
     controller: ControllerSpec | None = None
-    table: tuple[TableSpec, ...] = ()
     where: str = field(default="", compare=False)
 
 
 _SECTIONS: dict[str, type] = {
     "log": LogSpec, "file": FileSpec, "time": TimeSpec, "signals": SignalSpec, "drive": DriveSpec,
     "resample": ResampleSpec, "missing": MissingSpec, "format": TextFormat,
-    "controller": ControllerSpec, "table": TableSpec,
+    "controller": ControllerSpec,
 }  # fmt: skip
 _DRAFT = "rrrid import --guess FILE drafts a recipe"
 _POSITIVE = ("rate", "sample_time", "longest_gap", "counts_per_rev", "wrap", "period",
@@ -364,7 +342,7 @@ def _explain(error: Any, where: object) -> UsageError:
     parts = (f"[{part + 1}]" if isinstance(part, int) else str(part) for part in path)
     place = ".".join(parts).replace(".[", "[")
     if error["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-        kind = ColumnSpec if "columns" in path[:-1] else _SECTIONS.get(str(path[0]), Recipe)
+        kind = _SECTIONS.get(str(path[0]), Recipe)
         known = [f.name for f in fields(Recipe if len(path) == 1 else kind) if f.name != "where"]
         message = f"'{place}' is not a key of a recipe{did_you_mean(str(path[-1]), known)}"
         return UsageError("C01", message, where, f"known here: {', '.join(known)}")
@@ -408,25 +386,14 @@ def _signals(recipe: Recipe) -> Problems:
     if references and len(references) < len(_REFERENCES):
         message = f"{', '.join(references)} alone: q_ref, dq_ref and ddq_ref come together"
         yield "C02", message, "map all three, or none"
-    for name in () if _maps_alone(recipe) else ("q", "tau"):
+    for name in ("q", "tau"):
         if name not in recipe.signals:
             remedy = f"add {name} = {{ columns = …, unit = … }} to [signals]"
             yield "S01", f"the recipe maps no signal '{name}'", remedy
 
 
-def _no_logs(recipe: Recipe) -> bool:
-    return not recipe.log.match and all(case.skip for case in recipe.file)
-
-
-def _maps_alone(recipe: Recipe) -> bool:
-    """Return whether there are tables alone: they have no clock and no signals."""
-    return _no_logs(recipe) and bool(recipe.table)
-
-
 def _times(recipe: Recipe) -> Problems:
     """C02, S09: rates are rates, columns of time have units, and there are logs."""
-    if _maps_alone(recipe):
-        return
     time = recipe.time
     resampled = recipe.resample.rate if recipe.resample else None
     for place, rate in (("time.rate", time.rate), ("resample.rate", resampled)):
@@ -446,5 +413,8 @@ def _times(recipe: Recipe) -> Problems:
     if time.column is None and time.rate is None and time.sample_time is None:
         remedy = "give the column of the time stamps, or the sampling rate [Hz]"
         yield "C02", "'time' has neither column nor rate", remedy
-    if _no_logs(recipe):
+    for k, case in enumerate(recipe.file, start=1):
+        if not case.match:
+            yield "C02", f"'file[{k}].match' is empty", 'write match = "*.csv", or remove the case'
+    if not recipe.log.match and all(case.skip for case in recipe.file):
         yield "C02", "the recipe matches no files", 'write match = "*.csv" in [log], or [[file]]'

@@ -40,9 +40,13 @@ class Recording:
         """Return the recording of some samples."""
         kept = np.arange(self.t.size)[chosen]
         breaks = {int(np.searchsorted(kept, b)) for b in self.breaks} - {0, kept.size}
-        signals = {name: values[chosen] for name, values in self.signals.items()}
-        places, breaks_kept = self.places[chosen], tuple(sorted(breaks))
-        return replace(self, t=self.t[chosen], signals=signals, places=places, breaks=breaks_kept)
+        return replace(
+            self,
+            t=self.t[chosen],
+            signals={name: values[chosen] for name, values in self.signals.items()},
+            places=self.places[chosen],
+            breaks=tuple(sorted(breaks)),
+        )
 
     def listed(self, which: Index) -> str:
         """Return lines or rows in words, the first few."""
@@ -84,8 +88,9 @@ def repair(recording: Recording, limits: Limits) -> tuple[tuple[Recording, ...],
     recording = _drop_duplicates(recording, checks)
     steady = _split_at_steps(recording, checks)
     parts = tuple(piece for part in steady for piece in _split_at_gaps(part, limits, checks))
-    for part in parts if not limits.resampled else ():
-        checks += _uneven(part)  # of a resampled log, they are in its record
+    if not limits.resampled:  # of a resampled log, it is in its record
+        for part in parts:
+            _say_uneven(part, checks)
     return parts, tuple(checks)
 
 
@@ -95,41 +100,20 @@ def late_intervals(part: Recording) -> Index:
     return common.late(ticks, common.jitter(ticks)[0])
 
 
-def _uneven(part: Recording) -> list[Check]:
-    """T03, T05: report lost samples and uneven time, which stay."""
-    checks = []
-    steps = np.diff(part.t)
-    median = float(np.median(steps))
-    rms, worst = common.jitter(steps / median)
-    gaps = late_intervals(part)
-    lost = int(np.round(steps[gaps] / median - 1.0).sum())
-    if lost:
-        share = f"{100.0 * lost / (lost + part.t.size):.2g} %"
-        where = f"{many(gaps.size, 'gap')} of at most {common.GAP_LIMIT}"
-        message = f"{many(lost, 'sample')} ({share}) lost in {where}, after {part.listed(gaps)}"
-        remedy = "give the recorder more priority, or record fewer signals"
-        checks.append(part.check("T03", message, remedy, "warn"))
-    if rms > common.LARGEST_JITTER:
-        message = f"time is uneven: steps vary about {median:.6g} s by {percent(rms)} (rms), at "
-        remedy = "add [resample] rate = … for an even grid"
-        checks.append(part.check("T05", f"{message}most by {percent(worst)}", remedy, "warn"))
-    return checks
-
-
 def _mark_missing(
     recording: Recording, missing: tuple[float, ...], checks: list[Check]
 ) -> Recording:
     """D03: make declared sentinels NaN; refuse infinite, absurd and undeclared ones."""
     signals, problems = {}, Gathering()
     for name, raw in recording.signals.items():
-        hit = np.isin(raw, np.array(missing)) if missing else np.zeros(raw.shape, dtype=bool)
+        hit = np.isin(raw, missing)
         signals[name] = values = np.where(hit, np.nan, raw)
         if hit.any():
             message = f"{int(hit.sum())} numbers of {name} are declared missing values"
             checks.append(recording.check("D03", message, "correct [missing] if these are samples"))
         absurd = np.abs(values) * recording.si.get(name, 1.0) >= common.ABSURD
         filler = common.sentinels(values) & ~absurd
-        for joint in np.flatnonzero((absurd | filler).any(axis=0)):
+        for joint in np.flatnonzero((absurd | filler).any(axis=0)).tolist():
             bad = np.flatnonzero(absurd[:, joint] if absurd[:, joint].any() else filler[:, joint])
             number = float(values[bad[0], joint])
             message = f"{number:g} in {recording.listed(bad)}"
@@ -137,33 +121,29 @@ def _mark_missing(
                 message += " looks like 'no sample': nothing else comes near it"
             value = repr(number).removesuffix(".0")
             remedy = f"if it means 'no sample', add [missing] values = [{value}]; else the "
-            where, remedy = recording.column(name, int(joint)), f"{remedy}recording is damaged"
+            remedy += "recording is damaged"
             with problems.part():
-                raise InputRejected("D03", message, where, remedy)
+                raise InputRejected("D03", message, recording.column(name, joint), remedy)
     problems.raise_all()
     return replace(recording, signals=signals)
 
 
 def _drop_missing(recording: Recording, checks: list[Check]) -> Recording:
     """D01, D02: leave out samples with a hole, which leaves a gap; refuse a channel of holes."""
-    lost = ~np.isfinite(recording.t)
-    every = recording.signals.values()
-    empty = np.all([np.isnan(values).all(axis=1) for values in every], axis=0)
+    empty = np.all([np.isnan(x).all(axis=1) for x in recording.signals.values()], axis=0)
     if recording.clocked and 0.0 < empty.mean() < 1.0:  # rows of other topics: no samples of these
-        return _drop_missing(recording.take(~empty), checks)
+        recording = recording.take(~empty)
+    lost = ~np.isfinite(recording.t)
     if lost.all():
         raise recording.refused("D02", "no time stamp is a number", "choose another column of time")
     for name, values in recording.signals.items():
         holes = np.isnan(values)
-        for joint in np.flatnonzero(holes.mean(axis=0) > REPAIR.most_missing):
+        for joint in np.flatnonzero(holes.mean(axis=0) > REPAIR.most_missing).tolist():
             share = holes[:, joint].mean()
-            some = f"{100 * share:.0f} % of its samples are missing"
-            message = "holds no number at all" if share == 1.0 else some
-            where, remedy = (
-                recording.column(name, int(joint)),
-                "choose another column, or record again",
-            )
-            raise InputRejected("D02", message, where, remedy)
+            message = f"{100 * share:.0f} % of its samples are missing"
+            message = "holds no number at all" if share == 1.0 else message
+            remedy = "choose another column, or record again"
+            raise InputRejected("D02", message, recording.column(name, joint), remedy)
         lost |= holes.any(axis=1)
     if not lost.any():
         return recording
@@ -178,8 +158,7 @@ def _drop_missing(recording: Recording, checks: list[Check]) -> Recording:
 
 def _drop_duplicates(recording: Recording, checks: list[Check]) -> Recording:
     """T02: drop a sample that is written twice; refuse one stamp with two values."""
-    again = np.concatenate([[False], np.diff(recording.t) == 0.0])
-    which = np.flatnonzero(again)
+    which = np.flatnonzero(np.diff(recording.t) == 0.0) + 1
     if not which.size:
         return recording
     every = recording.signals.values()
@@ -191,7 +170,7 @@ def _drop_duplicates(recording: Recording, checks: list[Check]) -> Recording:
         raise recording.refused("T02", message, remedy)
     message = f"{which.size} samples that stand twice dropped ({recording.listed(which)})"
     checks.append(recording.check("T02", message, "let each sample be recorded once"))
-    return recording.take(~again)
+    return recording.take(np.isin(np.arange(recording.t.size), which, invert=True))
 
 
 def _split_at_steps(recording: Recording, checks: list[Check]) -> tuple[Recording, ...]:
@@ -217,8 +196,7 @@ def _split_at_steps(recording: Recording, checks: list[Check]) -> tuple[Recordin
 def _cut(recording: Recording, cuts: Sequence[int]) -> tuple[tuple[Recording, ...], str]:
     """Return the parts between `cuts` that are long enough for a log, and words for it."""
     size = recording.t.size
-    ends = zip([0, *cuts], [*cuts, size], strict=True)
-    parts = [recording.take(slice(a, b)) for a, b in ends]
+    parts = [recording.take(slice(a, b)) for a, b in zip([0, *cuts], [*cuts, size], strict=True)]
     shortest = max(FEWEST, REPAIR.shortest_part * size / len(parts))
     kept = tuple(part for part in parts if part.t.size >= shortest)
     words = "one part is kept" if len(kept) == 1 else f"split into {len(kept)} parts"
@@ -245,3 +223,21 @@ def _split_at_gaps(part: Recording, limits: Limits, checks: list[Check]) -> tupl
         raise part.refused("T04", f"{words}: {most}", "record again without interruption")
     checks.append(part.check("T04", f"{words}: {into}", "look why the recorder stopped there"))
     return kept
+
+
+def _say_uneven(part: Recording, checks: list[Check]) -> None:
+    """T03, T05: report lost samples and uneven time, which stay."""
+    steps = np.diff(part.t)
+    median = float(np.median(steps))
+    gaps = late_intervals(part)
+    if lost := int(np.round(steps[gaps] / median - 1.0).sum()):
+        share = f"{100.0 * lost / (lost + part.t.size):.2g} %"
+        where = f"{many(gaps.size, 'gap')} of at most {common.GAP_LIMIT}"
+        message = f"{many(lost, 'sample')} ({share}) lost in {where}, after {part.listed(gaps)}"
+        remedy = "give the recorder more priority, or record fewer signals"
+        checks.append(part.check("T03", message, remedy, "warn"))
+    rms, worst = common.jitter(steps / median)
+    if rms > common.LARGEST_JITTER:
+        message = f"time is uneven: steps vary about {median:.6g} s by {percent(rms)} (rms), at "
+        remedy = "add [resample] rate = … for an even grid"
+        checks.append(part.check("T05", f"{message}most by {percent(worst)}", remedy, "warn"))

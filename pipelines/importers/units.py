@@ -53,25 +53,20 @@ def drive_of(spec: DriveSpec, robot: RobotDescription, where: object) -> Drive |
             message = f"drive.transmission must hold {n} gear ratios, or {n} rows of {n} numbers"
             remedy = "write the gear ratio of each joint, or the matrix N of q_motor = N q_joint"
             raise UsageError("C02", message, where, remedy)
-        unit = np.eye(n)
-        pairs = zip(rows, unit, strict=True)
+        pairs = zip(rows, np.eye(n), strict=True)
         square = np.array([row if isinstance(row, tuple) else row * e for row, e in pairs])
         if abs(np.linalg.det(square)) < RECIPE.singular:
             message, remedy = "drive.transmission cannot be inverted", "each joint needs a motor"
             raise UsageError("C02", message, where, remedy)
         matrix = tuple(map(tuple, square.tolist()))
     if spec.torque_constant is not None:
-        numbers = _per_joint(spec.torque_constant, n, "drive.torque_constant", where)
-        constants = tuple(numbers.tolist())
+        each = _per_joint(spec.torque_constant, n, "drive.torque_constant", where)
+        constants = tuple(each.tolist())
     return None if matrix is None and constants is None else Drive(matrix, constants)
 
 
 def _per_joint(value: Numbers, n: int, what: str, where: object) -> Array:
-    """Return a number of each joint.
-
-    Raises:
-        UsageError: C02, there are more or fewer than joints.
-    """
+    """Return a number of each joint; C02 where there are more or fewer."""
     if isinstance(value, tuple) and len(value) != n:
         message = f"{what} holds {len(value)} numbers, the robot has {n} joints"
         raise UsageError("C02", message, where, "one number, or one a joint")
@@ -85,70 +80,65 @@ def own_units(name: str, robot: RobotDescription) -> tuple[str, ...]:
     return tuple(schema.joint_unit(name, revolute) for revolute in robot.revolute)
 
 
-def unit_declared(
+def units_of(
     name: str,
     spec: SignalSpec,
+    robot: RobotDescription,
     table: RawTable,
     columns: tuple[str, ...],
-    robot: RobotDescription,
     assume: bool,
 ) -> tuple[tuple[str, ...], list[Check]]:
     """Return the unit of each joint: the recipe's, else the header's.
 
     Raises:
-        InputRejected: S04, neither says it. S05, both differ.
+        InputRejected: S04, neither says it. S05, both differ. UsageError: C02, not one a joint.
     """
-    where = f"{table.source}, signal {name}"
-    headers = [table.units.get(column) for column in columns]
+    where, n = f"{table.source}, signal {name}", robot.n_joints
+    headers, own = [table.units.get(column) for column in columns], own_units(name, robot)
+    given = [header for header in headers if header is not None]
     if spec.unit is not None:
-        units, checks = units_of_recipe(name, spec, robot, where)
+        units, checks = declared_units(name, spec, robot, where)
         for header, unit in zip(headers, units, strict=True):
             known = UNITS.get(canonical_unit(header or "")), UNITS.get(canonical_unit(unit))
             if None not in known and known[0] != known[1]:
                 message = f"the header says '{header}', the recipe says '{unit}'"
                 raise InputRejected("S05", message, where, "correct one of them")
         return units, checks
-    given = [header for header in headers if header is not None]
-    if given and (len(set(given)) == 1 or len(given) == len(columns)):
+    if given and len({*given}) in (1, n):
         message = f"unit '{', '.join(dict.fromkeys(given))}' taken from the header"
         units = tuple(header or given[0] for header in headers)
         return units, [Check.of("S06", "ok", message, where)]
-    wanted = own_units(name, robot)
     if not assume:
-        words = f'"{wanted[0]}"' if len(set(wanted)) == 1 else json.dumps(wanted)
+        words = f'"{own[0]}"' if len({*own}) == 1 else json.dumps(own)
         message = f"no unit; say what the numbers of {name} are in"
         remedy = f"add unit = {words} (or what it is) to signals.{name}"
         remedy += ", or pass --assume-units if they are SI"
         raise InputRejected("S04", message, where, remedy)
-    message = f"no unit; taken as {', '.join(dict.fromkeys(wanted))}, as --assume-units says"
-    remedy = "write the unit in the recipe"
-    return wanted, [Check.of("S04", "warn", message, where, remedy)]
+    message = f"no unit; taken as {', '.join(dict.fromkeys(own))}, as --assume-units says"
+    return own, [Check.of("S04", "warn", message, where, "write the unit in the recipe")]
 
 
-def units_of_recipe(
+def declared_units(
     name: str, spec: SignalSpec, robot: RobotDescription, where: object
 ) -> tuple[tuple[str, ...], list[Check]]:
     """Return the unit of each joint that the recipe declares.
 
     One SI unit for an arm of turning and sliding joints is SI for each of them, as in a log: "rad"
     is m where a joint slides.
-
-    Raises:
-        UsageError: C02, there are more or fewer units than joints.
     """
-    n = robot.n_joints
-    if isinstance(spec.unit, tuple):
-        if len(spec.unit) != n:
-            message = f"signals.{name}.unit holds {len(spec.unit)} units, the robot has {n} joints"
+    unit, own, n = spec.unit or "", own_units(name, robot), robot.n_joints
+    if isinstance(unit, tuple):
+        if len(unit) != n:
+            message = f"signals.{name}.unit holds {len(unit)} units, the robot has {n} joints"
             raise UsageError("C02", message, where, "one unit, or one a joint")
-        return spec.unit, []
-    unit = canonical_unit(spec.unit or "")
-    own = own_units(name, robot)
-    if spec.side == "motor" or len(set(own)) == 1 or unit != schema.unit_of(name):
-        return (spec.unit or "",) * n, []
-    joints = enumerate(zip(own, robot.joints, strict=True), start=1)
-    other = ", ".join(f"{x} for joint {j} '{joint.name}'" for j, (x, joint) in joints if x != unit)
-    message = f"'{unit}' declared for turning and sliding joints: taken as SI, {other}"
+        return unit, []
+    unit_si = canonical_unit(unit) == schema.unit_of(name) and spec.side != "motor"
+    if not unit_si or len({*own}) == 1:
+        return (unit,) * n, []
+    joints = zip(own, robot.joints, strict=True)
+    said = [f"{x} for joint {j} '{joint.name}'" for j, (x, joint) in enumerate(joints, 1)
+            if x != canonical_unit(unit)]  # fmt: skip
+    message = f"'{unit}' declared for turning and sliding joints: taken as SI, {', '.join(said)}"
     remedy = f"write unit = {json.dumps(own)} in signals.{name}"
     return own, [Check.of("S05", "warn", message, where, remedy)]
 
@@ -176,7 +166,7 @@ def joint_side(
             constant.
     """
     done, problems = Converted(), Gathering()
-    n, where, controller = robot.n_joints, recipe.where, recipe.controller
+    n, where, law = robot.n_joints, recipe.where, recipe.controller and recipe.controller.law
     for name, raw in part.signals.items():
         with problems.part():
             spec, each = recipe.signals[name], units[name]
@@ -186,15 +176,15 @@ def joint_side(
             values = _unwrapped(part, name, raw, spec, each, done) * factor
             values = _in_si(part, name, values, recipe, each, drive, done)
             if schema.SIGNALS[name][0] in (*MOTION, "torque"):
-                motor = recipe.drive.transmission is not None
-                if (spec.side or ("motor" if motor else "joint")) == "motor":
+                default = "joint" if recipe.drive.transmission is None else "motor"
+                if (spec.side or default) == "motor":
                     values = _through_drive(name, values, drive, where, done)
                 else:
                     _refuse_wrong_kind(part, name, each, robot)
             if offset.any():
                 done.steps.append(f"{name}: offset {', '.join(f'{x:.6g}' for x in offset)} added")
-            unit = schema.unit_of(name, controller.law if controller else None)
-            done.signals[name] = Signal(values + offset, unit, schema.SIGNALS[name][1])
+            signal = Signal(values + offset, schema.unit_of(name, law), schema.SIGNALS[name][1])
+            done.signals[name] = signal
     problems.raise_all()
     for j, joint in enumerate(() if trust_units or "q" not in done.signals else robot.joints):
         low, high = joint.position
@@ -219,32 +209,28 @@ def _unwrapped(
     Where the recipe names no range, and every large step of a position is a whole turn amid small
     ones, these are unwrapped too.
     """
-    wrap = spec.wrap
-    if wrap is None and len(set(units)) == 1 and schema.SIGNALS[name][0] == "position":
-        known = UNITS.get(canonical_unit(units[0]))
-        turn = math.inf if known is None else 2.0 * math.pi / known.factor
-        if units[0] == "counts" and isinstance(spec.counts_per_rev, int | float):
+    wrap, steps = spec.wrap, np.diff(raw, axis=0)
+    if wrap is None and len({*units}) == 1 and schema.SIGNALS[name][0] == "position":
+        unit = canonical_unit(units[0])
+        turn = math.inf
+        if unit in UNITS and unit not in _LINEAR:
+            turn = 2.0 * math.pi / UNITS[unit].factor
+        elif isinstance(spec.counts_per_rev, int | float):
             turn = float(spec.counts_per_rev)
-        turn = math.inf if units[0] in _LINEAR else turn
-        steps, near = np.abs(np.diff(raw, axis=0)), RECIPE.turn_ratio * turn
-        large = steps > 0.5 * turn
-        if large.any() and not large.all() and np.abs(steps[large] - turn).max() < near:
-            wrap = turn if steps[~large].max() < near else None
-    turns = np.zeros((len(raw) - 1, raw.shape[1]))
-    if wrap is not None:
-        turns = np.round(np.diff(raw, axis=0) / wrap)
-    if wrap is None or not turns.any():
+        large, near = np.abs(steps) > 0.5 * turn, RECIPE.turn_ratio * turn
+        if large.any() and not large.all() and np.abs(np.abs(steps[large]) - turn).max() < near:
+            wrap = turn if np.abs(steps[~large]).max() < near else None
+    turns = np.round(steps / (wrap or math.inf))
+    if not turns.any():
         return raw
-    for joint in np.flatnonzero(turns.any(axis=0)):
+    for joint in np.flatnonzero(turns.any(axis=0)).tolist():
         count = many(int(np.abs(turns[:, joint]).sum()), "rollover")
         rollovers = f"{count} of {wrap:g} unwrapped"
-        at = part.listed(np.flatnonzero(turns[:, joint]) + 1)
-        message, where = f"{rollovers} ({at})", part.column(name, int(joint))
-        remedy = "let the recorder count turns"
+        message = f"{rollovers} ({part.listed(np.flatnonzero(turns[:, joint]) + 1)})"
+        remedy, where = "let the recorder count turns", part.column(name, joint)
         done.checks.append(Check.of("D07", "warn", message, where, remedy))
         done.altered.append(f"{name} of joint {joint + 1}: {rollovers}")
-    zero = np.zeros((1, raw.shape[1]))
-    return raw - wrap * np.concatenate([zero, np.cumsum(turns, axis=0)])
+    return raw - (wrap or 0.0) * np.cumsum(np.pad(turns, ((1, 0), (0, 0))), axis=0)
 
 
 def _in_si(
@@ -266,8 +252,8 @@ def _in_si(
         at = np.flatnonzero([other == unit for other in units])
         if unit in ("counts", "counts/s") and quantity in ("position", "velocity"):
             if spec.counts_per_rev is None:
-                message, remedy = "counts without counts_per_rev", "add counts_per_rev to signals."
-                raise InputRejected("S05", message, where, f"{remedy}{name}")
+                remedy = f"add counts_per_rev to signals.{name}"
+                raise InputRejected("S05", "counts without counts_per_rev", where, remedy)
             what = f"signals.{name}.counts_per_rev"
             turn = _per_joint(spec.counts_per_rev, len(units), what, recipe.where)
             rate = f"{spec.counts_per_rev} counts a revolution"
@@ -331,7 +317,6 @@ def _refuse_wrong_kind(
     own = own_units(name, robot)
     for j, (unit, joint) in enumerate(zip(units, robot.joints, strict=True)):
         if quantity_of(unit) != "current" and joint.revolute == (unit in _LINEAR):
-            each = f"one a joint: unit = {json.dumps(own)}"
-            wanted = f"such as {own[j]}" if len(set(own)) == 1 else each
             message = f"'{unit}' for joint {j + 1} '{joint.name}', which is {joint.type}"
-            raise InputRejected("S05", message, part.column(name, j), f"declare its unit, {wanted}")
+            remedy = f"declare its unit, one a joint: unit = {json.dumps(own)}"
+            raise InputRejected("S05", message, part.column(name, j), remedy)
