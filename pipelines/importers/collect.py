@@ -69,16 +69,16 @@ def collect(
     fits = patterns.matches([case.match for case in cases], names, path)
     hits: dict[str, tuple[FileSpec, Mapping[str, str], dict[str, str]]] = {}
     for name in names:
-        case, groups = next(((c, f[name]) for c, f in zip(cases, fits, strict=True) if name in f),
-                            (None, {}))  # fmt: skip
-        if case is not None and not case.skip:
-            hits[name] = case, groups, _files_of(recipe, groups, name)
+        first = next((k for k, fit in enumerate(fits) if name in fit), None)
+        if first is not None and not cases[first].skip:
+            groups = fits[first][name]
+            hits[name] = cases[first], groups, _files_of(recipe, groups, name)
     companions = {
         file for name, (*_, files) in hits.items() for file in files.values() if file != name
     }
     read: dict[str, RawTable] = {}
     sources, problems = list[Source](), Gathering()
-    for name, (case, groups, files) in hits.items():
+    for name, (case, found, files) in hits.items():
         if name in companions:
             continue
         with problems.part():
@@ -93,7 +93,7 @@ def collect(
                     inside = patterns.inside(folder, file, path)
                     read[file] = read_table(inside, recipe.format, file)
             tables = {file: read[file] for file in dict.fromkeys([name, *files.values()])}
-            sources.append(Source(case, groups, name, tables, files))
+            sources.append(Source(case, found, name, tables, files))
     problems.raise_all()
     recorded = [name for name in names if Path(name).suffix.lower() in RECORDINGS]
     if not sources:

@@ -335,9 +335,21 @@ def _log(
         controller=_controller(recipe.controller),
         derived=_derived(files, material, done, about.recorded) if done.altered else None,
     )
-    words, size = (files, tuple(done.steps), tuple(done.altered)), (t.size, robot.n_joints)
-    kind = (log.experiment, log.role, log.joint)
-    return ImportedLog(name, "", *kind, *size, step, float(t[-1] - t[0]), *words, log)
+    return ImportedLog(
+        name=name,
+        file="",  # known when all are named
+        experiment=log.experiment,
+        role=log.role,
+        joint=log.joint,
+        samples=t.size,
+        joints=robot.n_joints,
+        sample_time=step,
+        duration=float(t[-1] - t[0]),
+        sources=files,
+        steps=tuple(done.steps),
+        altered=tuple(done.altered),
+        log=log,
+    )
 
 
 def _about(base: LogSpec, source: Source, where: str) -> LogSpec:

@@ -71,8 +71,13 @@ def matches(
     if all(":" not in p and len(re.findall(r"\{|\*+", p)) <= RECIPE.simple for p in flat):
         return work()
     try:
-        limits = {"seconds": RECIPE.seconds, "memory": RECIPE.memory}
-        return list(guarded(lambda: Answer({"found": work()}, {}), where, **limits).about["found"])
+        apart = guarded(
+            lambda: Answer({"found": work()}, {}),
+            where,
+            seconds=RECIPE.seconds,
+            memory=RECIPE.memory,
+        )
+        return list(apart.about["found"])
     except InputRejected:
         message = f"a pattern takes more than {RECIPE.seconds:.0f} s: {', '.join(flat)}"
         remedy = "write fewer wildcards, and no repetition inside another, such as (a+)+"

@@ -166,7 +166,11 @@ def joint_side(
             constant.
     """
     done, problems = Converted(), Gathering()
-    n, where, law = robot.n_joints, recipe.where, recipe.controller and recipe.controller.law
+    n, where, law = (
+        robot.n_joints,
+        recipe.where,
+        recipe.controller.law if recipe.controller else None,
+    )
     for name, raw in part.signals.items():
         with problems.part():
             spec, each = recipe.signals[name], units[name]
