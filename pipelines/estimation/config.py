@@ -129,7 +129,7 @@ class ConsistencyConfig:
 
     limit: float = 3.0  # standard deviations within which noise explains the distance
     gap: float = 1e-4  # of ½ distance², absolute and relative, where the search stops
-    bound: float = 100.0  # times the largest estimate: what mass and moments stay below
+    inside: float = 1.1  # times the least distance, at which bodies lie inside of what exists
 
 
 @dataclass(frozen=True)
@@ -206,7 +206,6 @@ class LinksConfig:
     radius: float = 0.1  # [m] of a ball
     thin: float = 1e-3  # of a ball's second moment, that a point or a rod is given
     relative: float = 1e-3  # std of a base parameter without one, of the largest
-    inside: float = 0.1  # of the distance to what exists, to be inside of it
 
 
 @dataclass(frozen=True)

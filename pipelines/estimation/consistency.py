@@ -1,4 +1,4 @@
-"""Decide whether bodies that could exist explain the estimates.
+"""Decide whether bodies that could exist explain the estimates, and find the nearest that do.
 
 A rigid body's ten parameters are those of some distribution of mass exactly if its pseudo-inertia
 is positive semidefinite (Wensing, Kim & Slotine 2018, Theorem 1):
@@ -7,14 +7,16 @@ is positive semidefinite (Wensing, Kim & Slotine 2018, Theorem 1):
         [ hᵀ m ]
 
 Torque shows only combinations β = L φ of the parameters φ of all bodies. Consistent is an estimate
-for which bodies exist whose β lies within its covariance (Sousa & Cortesão 2014, who state it as a
-semidefinite programme):
+for which bodies exist whose β lies within its covariance (Sousa & Cortesão 2014):
 
     minimise  ½ (β̂ - L φ)ᵀ C⁻¹ (β̂ - L φ)    over φ with every J_i(φ_i) ⪰ 0
 
-It is solved by a barrier method (Boyd & Vandenberghe 2004, section 11.3) in about ten milliseconds;
-a conic solver needs scipy.sparse, which takes half a second to load. Masses are bounded, far above
-those of any arm, because torque leaves some of them open.
+A barrier method solves it (Boyd & Vandenberghe 2004, section 11.3). Its barrier is the divergence
+
+    ε Σ_i tr(J0_i⁻¹ J_i) - log det J_i
+
+from bodies J0, which no choice of frames or units changes (Lee & Park 2018). Where bodies with
+this β exist, those are found at ε → 0 that are nearest to J0 in it.
 """
 
 from __future__ import annotations
@@ -23,16 +25,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.dynamics.base_parameters import BaseArm
 from pipelines.dynamics.body import RigidBody
-from pipelines.dynamics.rrr import RRR, combined
 from pipelines.estimation.config import ConsistencyConfig
 from pipelines.estimation.estimate import Estimate
 from pipelines.io.log import Array
 
 _CONFIG = ConsistencyConfig()
-_STEPS = 200  # numerics
-_ROUNDING = 1e-13  # numerics: of a Hessian with unit diagonal
+_STEPS = 400  # numerics: of Newton's method at most; fifty are usual
+_SHRINK = 30.0  # numerics: of ε between two centres
+_CENTRED = 0.05  # numerics: squared Newton decrement
+_CLOSE, _WAY = 0.3, 0.6  # numerics: size of a step back, and share of the way ahead
+_STUCK = 3e-4  # numerics: of the way; where less of it is left at each step there is no more
+_SETTLED = 1e-9  # numerics: squared Newton decrement, where the search ends
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,7 @@ class Consistency:
     distance: float  # standard deviations between the estimate and the nearest possible one
     nearest: Array  # (k,) the nearest possible β
     parameters: Array  # (bodies, 10) one set of bodies that has it; many do
+    inner: Array  # (bodies, 10) bodies a tenth farther off, inside of what exists
     violating: tuple[int, ...]  # bodies without whose condition the estimate would be consistent
 
 
@@ -60,73 +65,87 @@ def consistency(found: Estimate, body: RigidBody) -> Consistent | None:
 
     None where a parameter is not determined: nothing can be said of links then.
     """
-    if not found.trusted[list(found.columns.rigid)].all():
+    own = len(found.columns.kept)
+    if not found.trusted[:own].all():
         return None
-    kept = list(found.columns.kept)
-    own = len(kept)
-    if isinstance(body, RRR):
-        combine = combined(body.robot)
-    elif isinstance(body, BaseArm):
-        combine = body.base.combine
-    else:
-        raise TypeError(f"no links are known behind a {type(body).__name__}")
-    answer = physical_consistency(
-        found.beta[:own], found.robust.covariance[:own, :own], combine[kept]
+    covariance, combine = (
+        found.robust.covariance[:own, :own],
+        body.combine[list(found.columns.kept)],
     )
+    answer = physical_consistency(found.beta[:own], covariance, combine)
     names = tuple(body.robot.joints[i].name for i in answer.violating)
     return Consistent(answer.consistent, answer.distance, names)
 
 
 def _pseudo_map() -> Array:
-    """(4, 4, 10): J = Σ_k map[..., k] φ_k for φ = m, mx, my, mz, Ixx, Iyy, Izz, Ixy, Ixz, Iyz.
+    """(10, 4, 4): J = Σ_k map[k] φ_k for φ = m, mx, my, mz, Ixx, Iyy, Izz, Ixy, Ixz, Iyz.
 
     About the origin, products positive: Σ_xx = (Iyy + Izz - Ixx)/2, Σ_xy = Ixy.
     """
-    out = np.zeros((4, 4, 10))
-    out[3, 3, 0] = 1.0
+    out = np.zeros((10, 4, 4))
+    out[0, 3, 3] = 1.0
     for a in range(3):
-        out[a, 3, 1 + a] = out[3, a, 1 + a] = 1.0
-        out[a, a, 4:7] = 0.5
-        out[a, a, 4 + a] = -0.5
+        out[1 + a, a, 3] = out[1 + a, 3, a] = 1.0
+        out[4:7, a, a] = 0.5
+        out[4 + a, a, a] = -0.5
     for k, (a, b) in enumerate(((0, 1), (0, 2), (1, 2))):
-        out[a, b, 7 + k] = out[b, a, 7 + k] = 1.0
+        out[7 + k, a, b] = out[7 + k, b, a] = 1.0
     return out
 
 
-_PSEUDO = _pseudo_map()
-_TRACE = np.einsum("aak->k", _PSEUDO)
+PSEUDO = _pseudo_map()
+_AT_ONE = np.linalg.inv(np.einsum("kab,lba->kl", PSEUDO, PSEUDO))  # inverse Hessian at J = 1
+_BALL = np.diag([0.5, 0.5, 0.5, 1.0])
 
 
 def pseudo_inertia(parameters: Array) -> Array:
     """Return J (bodies, 4, 4) of standard parameters (bodies, 10)."""
-    return np.asarray((parameters @ _PSEUDO.reshape(16, 10).T).reshape(-1, 4, 4))
+    return np.asarray((parameters @ PSEUDO.reshape(10, 16)).reshape(-1, 4, 4))
 
 
-def physical_consistency(beta: Array, covariance: Array, combine: Array) -> Consistency:
+def standard(inertia: Array) -> Array:
+    """Return the standard parameters (10 bodies,) of pseudo-inertias (bodies, 4, 4)."""
+    flat = inertia.reshape(-1, 16) @ np.linalg.pinv(PSEUDO.reshape(10, 16))
+    return np.asarray(flat.ravel())
+
+
+def physical_consistency(
+    beta: Array, covariance: Array, combine: Array, prior: Array | None = None
+) -> Consistency:
     """Return whether bodies exist that reproduce `beta` within `covariance`.
 
     Args:
         beta: (k,) estimates.
         covariance: (k, k); an estimate with an infinite variance says nothing.
         combine: L (k, 10 · bodies), β = L φ.
+        prior: J0 (bodies, 4, 4).
     """
     known = np.isfinite(np.diag(covariance))
     whiten = _whitener(covariance[np.ix_(known, known)])
     a, b = whiten @ combine[known], whiten @ beta[known]
-    bound = _CONFIG.bound * max(float(np.abs(beta[known]).max(initial=0.0)), 1.0)
-    bodies = tuple(range(combine.shape[1] // 10))
-    phi = _nearest(a, b, _Barrier(bodies, len(bodies), bound))
-    distance = float(np.linalg.norm(a @ phi - b))
+    count = combine.shape[1] // 10
+    prior = np.tile(_BALL, (count, 1, 1)) if prior is None else prior
+
+    def away(phi: Array) -> float:
+        return float(np.linalg.norm(a @ phi - b))
+
+    path = _central_path(a, b, prior)
+    phi, distance = path[-1], away(path[-1])
+    inner = next(one for one in path if away(one) <= _CONFIG.inside * distance)
     violating: tuple[int, ...] = ()
     if distance > _CONFIG.limit:
-        without = []
-        for i in bodies:
-            others = _Barrier(tuple(k for k in bodies if k != i), len(bodies), bound)
-            without.append(float(np.linalg.norm(a @ _nearest(a, b, others) - b)))
+        without = (away(_central_path(a, b, prior, free=i)[-1]) for i in range(count))
         enough = max(_CONFIG.limit, 0.5 * distance)
-        violating = tuple(i for i in bodies if without[i] <= enough) or bodies
-    table = phi.reshape(len(bodies), 10)
-    return Consistency(distance <= _CONFIG.limit, distance, combine @ phi, table, violating)
+        violating = tuple(i for i, far in enumerate(without) if far <= enough)
+        violating = violating or tuple(range(count))
+    return Consistency(
+        distance <= _CONFIG.limit,
+        distance,
+        combine @ phi,
+        phi.reshape(count, 10),
+        inner.reshape(count, 10),
+        violating,
+    )
 
 
 def _whitener(covariance: Array) -> Array:
@@ -137,93 +156,112 @@ def _whitener(covariance: Array) -> Array:
     return np.asarray((vectors / np.sqrt(np.maximum(values, 1e-12))).T / std)
 
 
-@dataclass(frozen=True)
-class _Barrier:
-    """-Σ log det J_i - Σ log(bound - tr J_i) of held bodies, -Σ log(bound² - φ²) of others."""
+def _central_path(a: Array, b: Array, prior: Array, free: int | None = None) -> list[Array]:
+    """Return φ at the minimum of ½ ‖a φ - b‖² + ε barrier for falling ε; 5 · bodies ε is left.
 
-    held: tuple[int, ...]
-    bodies: int
-    bound: float
-
-    def value(self, phi: Array) -> float:
-        """Return the barrier; infinite outside."""
-        table = phi.reshape(self.bodies, 10)
-        free = [i for i in range(self.bodies) if i not in self.held]
-        inside = self.bound**2 - np.square(table[free])
-        inertias = pseudo_inertia(table[list(self.held)])
-        room = self.bound - np.einsum("iaa->i", inertias)
-        if (inside <= 0.0).any() or (room <= 0.0).any():
-            return float("inf")
-        try:
-            triangles = np.linalg.cholesky(inertias)
-        except np.linalg.LinAlgError:
-            return float("inf")
-        determinants = 2.0 * np.log(np.einsum("iaa->ia", triangles)).sum()
-        return float(-determinants - np.log(room).sum() - np.log(inside).sum())
-
-    def derivatives(self, phi: Array) -> tuple[Array, Array]:
-        """Return the gradient (10 · bodies,), and F with FᵀF the Hessian.
-
-        From J = T Tᵀ and S_k = T⁻¹ M_k T⁻ᵀ come -tr S_k and tr S_k S_l. Boyd & Vandenberghe 2004,
-        section A.4.
-        """
-        table = phi.reshape(self.bodies, 10)
-        gradient = np.zeros((self.bodies, 10))
-        factor = np.zeros((self.bodies, 17, self.bodies, 10))
-        for i in range(self.bodies):
-            if i in self.held:
-                inertia = pseudo_inertia(table[i : i + 1])[0]
-                inverse = np.linalg.inv(np.linalg.cholesky(inertia))
-                scaled = np.einsum("ab,bck,dc->adk", inverse, _PSEUDO, inverse)
-                room = _TRACE / (self.bound - float(np.trace(inertia)))
-                gradient[i] = room - np.einsum("aak->k", scaled)
-                factor[i, :16, i], factor[i, 16, i] = scaled.reshape(16, 10), room
-            else:
-                left = self.bound**2 - np.square(table[i])
-                gradient[i] = 2.0 * table[i] / left
-                factor[i, :10, i] = np.diag(np.sqrt(2.0 / left + np.square(gradient[i])))
-        return gradient.ravel(), factor.reshape(-1, phi.size)
-
-
-def _nearest(a: Array, b: Array, barrier: _Barrier) -> Array:
-    """Minimise t ½ ‖a φ - b‖² + barrier(φ) by Newton while t grows; 5 · bodies / t is left.
-
-    In coordinates x of which the first are a φ, rotated, and the others do not touch it: rounding
-    in what is known to many digits then does not reach what is not known at all.
+    Args:
+        prior: J0 (bodies, 4, 4), from where the path starts.
+        free: a body that need not exist.
     """
-    u, s, v = np.linalg.svd(a)
-    rank = int(np.sum(s > 1e-12 * s[0])) if len(s) else 0
-    basis = v.T.copy()
-    basis[:, :rank] /= s[:rank]
-    goal = u[:, :rank].T @ b
-    unit = np.tile([1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0], barrier.bodies)
-    x = np.concatenate([s[:rank], np.ones(v.shape[0] - rank)]) * (v @ unit)
-
-    def misfit(x: Array) -> float:
-        return float(np.sum(np.square(x[:rank] - goal)))
-
-    t = 1.0 / max(misfit(x), 1e-3)
+    phi, path = standard(prior), list[Array]()
+    slack = max(float(np.sum(np.square(a @ phi - b))), 1e-3)
     for _ in range(_STEPS):
-        gradient, factor = barrier.derivatives(basis @ x)
-        gradient, factor = basis.T @ gradient, factor @ basis
-        hessian = factor.T @ factor
-        gradient[:rank] += t * (x[:rank] - goal)
-        hessian[np.arange(rank), np.arange(rank)] += t
-        size = np.sqrt(np.diag(hessian))
-        scaled = hessian / size / size[:, None] + _ROUNDING * np.eye(len(size))
-        step = -np.linalg.solve(scaled, gradient / size) / size
-        decrement = -float(gradient @ step)
-        if decrement < 0.05:
-            if 5.0 * barrier.bodies / t < _CONFIG.gap * max(1.0, 0.5 * misfit(x)):
-                break
-            t *= 30.0
+        off = b - a @ phi
+        value, gradient, blocks = barrier(phi, prior, free)
+        step = _newton(a, off, gradient, blocks, slack)
+        decrement = float((a.T @ off / slack - gradient) @ step)
+        if decrement < _CENTRED:
+            path.append(phi)
+            if 5.0 * len(prior) * slack < _CONFIG.gap * max(1.0, 0.5 * float(off @ off)):
+                return path
+            slack /= _SHRINK
             continue
         # halve the step until it gains a quarter of what its slope promises
-        start = 0.5 * t * misfit(x) + barrier.value(basis @ x)
+        start = 0.5 * float(off @ off) / slack + value
         for length in np.power(0.5, np.arange(40)):
-            there = x + length * step
-            value = 0.5 * t * misfit(there) + barrier.value(basis @ there)
-            if value <= start - 0.25 * length * decrement:
-                x = there
+            rest = off - length * (a @ step)
+            there = barrier(phi + length * step, prior, free)[0]
+            if 0.5 * float(rest @ rest) / slack + there <= start - 0.25 * length * decrement:
+                phi = phi + length * step
                 break
-    return np.asarray(basis @ x)
+        else:  # rounding leaves no step
+            break
+    return path or [phi]
+
+
+def closest(a: Array, b: Array, prior: Array) -> Array | None:
+    """Return φ with a φ = b at the least divergence from J0; None where there is none.
+
+    Where there are such φ, there are some on all of the line from a φ0 to b. Newton's method goes
+    along it: most of the way to where a body ceases to exist, then back to the least divergence at
+    that place.
+    """
+    phi = described = standard(prior)
+    before = 0.0
+    for _ in range(_STEPS):
+        _, gradient, blocks = barrier(phi, prior)
+        sideways = _newton(a, np.zeros(len(a)), gradient, blocks)
+        ahead = _newton(a, b - a @ phi, np.zeros(len(phi)), blocks)
+        far = float(np.linalg.norm(_changes(phi, sideways)))
+        room = 1.0 / max(-float(_changes(phi, ahead).min()), _SETTLED)
+        step = sideways / (1.0 + far)
+        if far < _CLOSE:
+            if room < before and room < _STUCK:  # the way ends at the boundary
+                return None
+            before, step = room, sideways + min(1.0, _WAY * room) * ahead
+        if not _changes(described, phi + step).min() > _SETTLED:
+            return None  # so close to the boundary rounding leaves no step
+        phi = phi + step
+        if _WAY * room >= 1.0 and far**2 < _SETTLED:
+            return phi
+    return None
+
+
+def _changes(phi: Array, step: Array) -> Array:
+    """Return the eigenvalues of a step against J; a body ceases to exist at -1."""
+    inverse = np.linalg.inv(np.linalg.cholesky(pseudo_inertia(phi.reshape(-1, 10))))
+    change = pseudo_inertia(step.reshape(-1, 10))
+    return np.asarray(np.linalg.eigvalsh(inverse @ change @ inverse.transpose(0, 2, 1)))
+
+
+def _newton(a: Array, off: Array, gradient: Array, blocks: Array, slack: float = 0.0) -> Array:
+    """Return the step of Newton's method towards a step = `off`; met exactly without slack.
+
+    From H Δ + g = aᵀ ν and a Δ + ε ν = off: (a H⁻¹ aᵀ + ε) ν = off + a H⁻¹ g.
+    """
+    down = np.einsum("iab,ib->ia", blocks, gradient.reshape(-1, 10)).ravel()
+    across = np.einsum("kia,iab->kib", a.reshape(len(a), -1, 10), blocks).reshape(len(a), -1)
+    schur = across @ a.T + slack * np.eye(len(a))
+    size = np.sqrt(np.diag(schur))
+    schur = schur / size / size[:, None]
+    step = across.T @ (np.linalg.solve(schur, (off + a @ down) / size) / size) - down
+    if slack == 0.0:  # what rounding has left
+        step += across.T @ (np.linalg.solve(schur, (off - a @ step) / size) / size)
+    return np.asarray(step)
+
+
+def barrier(phi: Array, prior: Array, free: int | None = None) -> tuple[float, Array, Array]:
+    """Return the barrier, its gradient and the blocks (bodies, 10, 10) of its inverse Hessian.
+
+    The gradient is tr(J0⁻¹ M_k) - tr(J⁻¹ M_k), the Hessian tr(J⁻¹ M_k J⁻¹ M_l): with J = T Tᵀ that
+    of J = 1, seen through T. Of a free body it is the parabola that the barrier is at J0. Infinite
+    where a body cannot exist.
+    """
+    table = phi.reshape(-1, 10)
+    inertia = pseudo_inertia(table)
+    if free is not None:
+        inertia[free] = prior[free]
+    sizes = np.linalg.eigvalsh(inertia)
+    if not sizes.min() > 0.0:
+        return np.inf, phi, prior
+    triangle = np.linalg.cholesky(inertia)[:, None]
+    through = standard(triangle @ PSEUDO @ triangle.swapaxes(2, 3)).reshape(-1, 10, 10)
+    blocks = through.swapaxes(1, 2) @ _AT_ONE @ through
+    pull = np.einsum("iab,kba->ik", np.linalg.inv(prior), PSEUDO)
+    gradient = pull - np.einsum("iab,kba->ik", np.linalg.inv(inertia), PSEUDO)
+    value = (pull * table).sum(axis=1) - np.log(sizes).sum(axis=1)
+    if free is not None:
+        away = table[free] - standard(prior[free])
+        gradient[free] = np.linalg.solve(blocks[free], away)
+        value[free] = 0.5 * away @ gradient[free]
+    return float(value.sum()), gradient.ravel(), blocks
