@@ -57,11 +57,12 @@ class Guessing:
     """Drafts of recipes."""
 
     most_columns: int = 2000  # too many to guess what each is
-    most_files: int = 200  # of a folder
+    least: int = 2  # columns beside a clock without a name
     most_robots: int = 9
     most_joints: int = 16
     most_blocks: int = 6  # signals without names
     quoted: int = 5  # lines of the file
+    shown: int = 8  # candidates
     only_offered: int = 9  # rank of a signal that is never taken
     usable: float = 0.8  # of the cells of a column that is looked at
     no_number: float = 1e20  # nanoseconds since 1970 are 2e18

@@ -11,13 +11,14 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from pipelines.errors import InputRejected, RrridError, clean
+from pipelines.importers.clock import SECONDS
 from pipelines.importers.config import CLOCK, GUESS
 from pipelines.importers.links import LinkFit, TorqueModel, fit_links
 from pipelines.importers.names import COMMANDED, words_of
@@ -32,9 +33,8 @@ from pipelines.io.robot_files import load_robot
 from pipelines.io.sandbox import parse_toml
 from pipelines.io.units import UNITS, canonical_unit
 
-_ANGLES = {unit: UNITS[unit].factor for unit in ("rad", "deg", "rev", "mrad")}
-_SPEEDS = {unit: UNITS[unit].factor for unit in ("rad/s", "deg/s")}
-_TIMES = {unit: UNITS[unit].factor for unit in ("s", "ms", "us", "ns")}
+_ANGLES = ("rad", "deg", "rev", "mrad")
+_SPEEDS = ("rad/s", "deg/s")
 
 
 @dataclass(frozen=True)
@@ -56,13 +56,22 @@ class Draft:
 class Guess:
     """A value, "" where it is open, and why."""
 
-    value: str
-    why: str
+    value: str = ""
+    why: str = ""
     sure: bool = False
 
     @property
     def comment(self) -> str:
         return f"# {'' if self.sure else 'check: '}{clean(self.why, 300)}"
+
+
+@dataclass(frozen=True)
+class _Units:
+    """The units of position and torque, and why both signals are left open."""
+
+    q: Guess
+    tau: Guess
+    doubt: str = ""
 
 
 def guess_recipe(
@@ -83,29 +92,35 @@ def guess_recipe(
     files, arm, problem = _robot_beside(path.parent, robot)
     joints = [joint.name for joint in arm.joints] if arm else []
     roles = choose(table, joints, bool(COMMANDED & set(words_of(path.stem))))
-    model = model_of(arm) if arm is not None else None
-    units = _Units(table, roles, arm, model)
-    evidence = {"time unit": units.time, "q unit": units.q, "tau unit": units.tau}
+    time = _time_unit(roles.clock)
+    t = None
+    if roles.clock is not None and time.value in UNITS:
+        factor = 1.0 if len(roles.clock.columns) > 1 else UNITS[time.value].factor
+        t = (roles.clock.values - roles.clock.values[0]) * factor
+    units = _units(table, roles, arm, time)
+    if arm is not None and t is not None and (model := model_of(arm)) is not None:
+        units = _by_links(units, model, table, roles, arm, t)
     name, columns = clean(path.name, 80), ", ".join(clean(c, 40) for c in table.columns)
-    size = f"{table.rows.size} samples, columns {columns}"
+    size, law = f"{table.rows.size} samples", "q_motor = N q_joint, tau_joint = N^T tau_motor"
     lines = [
-        f"# Drafted by `rrrid import --guess {name}`: {size}.",
+        f"# Drafted by `rrrid import --guess {name}`: {size}, columns {columns}.",
         *(f"# {clean(c.message, 200)}." for c in table.checks if c.level != "ok"),
         *(f"# the file says: {clean(note, 200)}" for note in table.notes[: GUESS.quoted]),
         f'# Go through every "check:" and fill in what says {BLANK}; then: '
         "rrrid import RECIPE.toml --source FOLDER",
         *("", "[robot]", *_robot_lines(files, problem, robot is not None)),
-        *("", "[log]", f"match = {quoted(path.name)}      "
+        *("", "[log]", f"match = {quoted(path.name)}   "
           '# a pattern such as "run_{number}.csv" takes many files'),
-        'experiment = "free"                     '
-        "# check: friction | excitation | writing | frf | hold | free",
-        'role = "identify"                       # check: identify | validate | reference',
+        'experiment = "free"   # check: friction | excitation | writing | frf | hold | free',
+        'role = "identify"   # check: identify | validate | reference',
         _torque_kind(roles.chosen.get("tau")),
-        *("", "[time]", *_time_lines(roles.clock, units.time)),
-        *("", "[signals]", *_signal_lines(table, roles, units)),
-        *([] if "tau" in roles.chosen else _files_beside(path)),
-        *("", *_drive_lines(roles), "", *_resample_lines(units.t)),
+        *("", "[time]", *_time_lines(roles.clock, time)),
+        *("", "[signals]", *_signal_lines("q", table, roles, units.q, units.doubt)),
+        *_velocity_lines(table, roles, units, time),
+        *_signal_lines("tau", table, roles, units.tau, units.doubt),
+        *("", *_drive_lines(roles, law), "", *_resample_lines(t)),
     ]  # fmt: skip
+    evidence = {"time unit": time, "q unit": units.q, "tau unit": units.tau}
     said = tuple(f"{what}: {guess.value or 'open'} ({'sure' if guess.sure else 'likely'}: "
                  f"{guess.why})" for what, guess in evidence.items())  # fmt: skip
     return Draft("\n".join(lines) + "\n", said)
@@ -149,112 +164,6 @@ def _robot_beside(
     return (files, *found[0][1:]) if len(found) == 1 else (files, None, "")
 
 
-class _Units:
-    """The unit of time and of each signal, by names and by the two relations."""
-
-    def __init__(
-        self, table: RawTable, roles: Roles, arm: RobotDescription | None, model: TorqueModel | None
-    ) -> None:
-        self.roles, self.arm = roles, arm
-        q, tau = (roles.chosen.get(signal) for signal in ("q", "tau"))
-        self.time = _time_unit(roles.clock)
-        named = roles.clock is not None and self.time.value in UNITS
-        self.t = _seconds(roles.clock, self.time.value) if roles.clock and named else None
-        self.q, self.dq, self.tau = Guess("", ""), Guess("", ""), Guess("", "")
-        self.doubt = ""  # why motion and torque are both left open
-        if q is not None:
-            self.q = self._of_position(matrix(table, q), q)
-        if tau is not None and (own := _own(tau)):
-            why = "named so" if own in UNITS else f"named '{own}'"
-            self.tau = Guess(own if own in UNITS else "", why, own in UNITS)
-        turning = arm is not None and all(joint.revolute for joint in arm.joints)
-        angles = self.q.value in _ANGLES or not (self.q.value or self.q.why)
-        joints_own = not any(group.name.motor for group in (q, tau) if group)
-        if q and tau and model and turning and angles and joints_own and self.t is not None:
-            self._by_links(model, matrix(table, q), matrix(table, tau), tau, self.t)
-        if "dq" in roles.chosen:
-            self.dq = self._of_velocity(roles.chosen["dq"])
-
-    def _of_position(self, values: Array, group: Group) -> Guess:
-        """Return the unit of positions: named, or such that the velocity is their slope."""
-        named, slope = _own(group), self.roles.slope
-        speed = UNITS.get(_own(self.roles.chosen["dq"])) if slope is not None else None
-        step = _TIMES.get(self.time.value)
-        ratio = math.nan
-        if slope is not None and speed is not None and step is not None:
-            ratio = speed.factor * step / slope  # the SI of one recorded unit
-        if not named or named not in UNITS:
-            near = [u for u, f in _ANGLES.items() if abs(ratio / f - 1.0) < GUESS.same_ratio]
-            if named or not near:
-                return Guess(named if named == "counts" else "", f"named '{named}'" * bool(named))
-            return Guess(near[0], "the recorded velocity is the slope of the position")
-        if abs(ratio / UNITS[named].factor - 1.0) > GUESS.same_ratio:  # False for nan
-            return Guess("", f"named '{named}', but the recorded velocity is not its slope")
-        spans = np.ptp(values, axis=0) if self.arm else ()
-        for span, joint in zip(spans, self.arm.joints if self.arm else (), strict=True):
-            low, high = joint.position
-            if span * UNITS[named].factor > GUESS.twice_room * (high - low):
-                why = f"its name or header says '{named}', but joint '{joint.name}' would move over"
-                return Guess("", f"{why} {span:.4g} {named}, beyond its limits")
-        return Guess(named, "named so", True)
-
-    def _by_links(self, model: TorqueModel, q: Array, tau: Array, group: Group, t: Array) -> None:
-        """Take or refute units by what the robot's own links ask for."""
-        fits: dict[str, LinkFit] = {}
-        for unit in dict.fromkeys(("rad", "deg", *([self.q.value] if self.q.value else []))):
-            fit = fit_links(model, q * UNITS[unit].factor, t, tau)
-            fits |= {} if fit is None else {unit: fit}
-        if not fits:
-            return
-        best = min(fits, key=lambda unit: fits[unit].unexplained)
-        own = fits.get(self.q.value or best, fits[best])
-        if own.unexplained > GUESS.refutes and fits[best].unexplained > GUESS.refutes:
-            self.doubt = "torque and motion do not agree by the robot's own links: other torques, "
-            self.doubt += "or the order, unit or zero of the joints?"
-            return
-        named = UNITS.get(self.tau.value)
-        most = GUESS.gain if named else GUESS.unnamed_gain
-
-        def near(fit: LinkFit) -> bool:  # as large as the links' torque, in N m
-            gains = fit.gains * (named.factor if named else 1.0)
-            return gains.size > 0 and bool(((gains > 1.0 / most) & (gains < most)).all())
-
-        # Gears near 57 make radians of a motor look like degrees of a joint, but for the torque.
-        worse = [GUESS.better * fit.unexplained for name, fit in fits.items() if name != best]
-        proved = fits[best].unexplained < min(GUESS.proves, *worse, 1.0)
-        proved &= best == "rad" or near(fits[best])
-        follows = "the torque follows from the motion by the robot's links"
-        if proved and not self.q.value and not self.q.why:
-            self.q = Guess(best, f"{follows} in {best}")
-        elif proved and self.q.value not in ("", best):
-            self.q = Guess("", f"says '{self.q.value}', but {follows} if it is in {best}")
-        if group.name.quantity != "torque":
-            return
-        own = fits.get(self.q.value, own)
-        if not near(own):
-            why = f"{np.round(own.gains, 3).tolist()} times what weight and inertia of the robot's "
-            self.tau = Guess("", f"{why}links ask for: another unit or sign, or the motor's side?")
-        elif proved and self.q.value and not _own(group):
-            self.tau = Guess("N m", f"{follows} in N m")
-        elif self.tau.value and not proved:
-            share = f"{100.0 * (1.0 - own.unexplained):.0f} %"
-            why = f"named so, but the robot's links explain {share} of it: order, zero, side?"
-            self.tau = replace(self.tau, why=why, sure=False)
-        if group.name.origin == "commanded" and not proved:
-            self.doubt = "the command is not the torque that the robot's own links ask for"
-
-    def _of_velocity(self, group: Group) -> Guess:
-        """Return the unit of a velocity; "" unless it is the slope of the position."""
-        slope, angle, step = self.roles.slope, UNITS.get(self.q.value), _TIMES.get(self.time.value)
-        if slope is None or angle is None or step is None:
-            return Guess("", "not the slope of the position" if slope is None else "")
-        size = slope * angle.factor / step
-        near = [u for u, f in _SPEEDS.items() if abs(size / f - 1.0) < GUESS.same_ratio]
-        named = _own(group)
-        unit = next((u for u in near if named in ("", u)), named if not near else "")
-        return Guess(unit, "the slope of the position")
-
-
 def _own(group: Group) -> str:
     """Return the unit that names say of all columns of a group, as `UNITS` spells it, else ""."""
     return canonical_unit(group.unit) if group.unit else ""
@@ -278,30 +187,125 @@ def _time_unit(clock: Clock | None) -> Guess:
         return Guess(named if plausible else "", why, plausible)
     if clock.values[0] in (0.0, 1.0) and (steps == 1.0).all():
         return Guess("", "counts 1, 2, 3, …: ms, or samples?")
-    rates = {u: 1.0 / (step * f) for u, f in _TIMES.items()}
+    rates = {u: 1.0 / (step * f) for u, f in SECONDS.items()}
     fits = [u for u, rate in rates.items() if GUESS.slowest <= rate <= GUESS.fastest]
-    since = [u for u, f in _TIMES.items() if CLOCK.from_2001 < clock.values[0] * f < CLOCK.to_2096]
+    since = [u for u, f in SECONDS.items() if CLOCK.from_2001 < clock.values[0] * f < CLOCK.to_2096]
     fits = [u for u in fits if u in since] or fits
     if len(fits) == 1:
         return Guess(fits[0], f"steps of {step:.6g} are {rates[fits[0]]:.6g} Hz")
     return Guess("", f"steps of {step:.6g}: {' or '.join(fits) or 'no usual unit'}")
 
 
-def _seconds(clock: Clock, unit: str) -> Array:
-    factor = 1.0 if len(clock.columns) > 1 else UNITS[unit].factor
-    return np.asarray((clock.values - clock.values[0]) * factor, dtype=np.float64)
+def _units(table: RawTable, roles: Roles, arm: RobotDescription | None, time: Guess) -> _Units:
+    """Return the units that names say and the recorded velocity does not refute, or proves."""
+    q, dq, tau = (roles.chosen.get(signal) for signal in ("q", "dq", "tau"))
+    step = SECONDS.get(time.value, math.nan)
+    slope = (roles.slope or math.nan) / step  # q over dq, a second
+    position = Guess()
+    if q is not None:
+        speed = UNITS.get(_own(dq)) if dq else None
+        position = _of_position(q, table, arm, speed.factor / slope if speed else math.nan)
+    own = _own(tau) if tau else ""
+    why = "named so" if own in UNITS else f"named '{own}'" * bool(own)
+    return _Units(position, Guess(own if own in UNITS else "", why, own in UNITS))
 
 
-def _robot_lines(files: Sequence[str], problem: str, named: bool) -> list[str]:
-    if len(files) == 1:
-        why = "as --robot says" if named else "check: likely, it lies in the same folder"
-        lines = [f"use = {quoted(files[0])}   # {why}"]
-        lines += [f"# {clean(problem, 300)}"] if problem else []
-        return [*lines, *([f'tip_link = "{BLANK}"'] if "tip_link" in problem else [])]
-    which = "robot.toml, a URDF, or a shipped name"
-    if files:
-        which = f"one of {', '.join(clean(file, 40) for file in files)}"
-    return [f'use = "{BLANK}"   # the robot: {which}']
+def _near(size: float, units: tuple[str, ...]) -> list[str]:
+    """Return which of `units` is `size` in SI; none of nan."""
+    return [u for u in units if abs(size / UNITS[u].factor - 1.0) < GUESS.same_ratio]
+
+
+def _of_position(group: Group, table: RawTable, arm: RobotDescription | None, size: float) -> Guess:
+    """Return the unit of positions: named, or of `size` in SI, as the recorded velocity says."""
+    named = _own(group)
+    if named not in UNITS:
+        near = _near(size, _ANGLES)
+        if named or not near:
+            return Guess(named if named == "counts" else "", f"named '{named}'" * bool(named))
+        return Guess(near[0], "the recorded velocity is the slope of the position")
+    factor = UNITS[named].factor
+    if abs(size / factor - 1.0) > GUESS.same_ratio:  # False for nan
+        return Guess("", f"named '{named}', but the recorded velocity is not its slope")
+    spans = np.ptp(matrix(table, group), axis=0).tolist()
+    for span, joint in zip(spans, arm.joints if arm else (), strict=False):
+        low, high = joint.position
+        if span * factor > GUESS.twice_room * (high - low):
+            why = f"its name or header says '{named}', but joint '{joint.name}' would move over"
+            return Guess("", f"{why} {span:.4g} {named}, beyond its limits")
+    return Guess(named, "named so", True)
+
+
+def _by_links(
+    units: _Units,
+    model: TorqueModel,
+    table: RawTable,
+    roles: Roles,
+    arm: RobotDescription,
+    t: Array,
+) -> _Units:
+    """Take or refute units by what the robot's own links ask for."""
+    q, tau = (roles.chosen.get(signal) for signal in ("q", "tau"))
+    angles = units.q.value in _ANGLES or not (units.q.value or units.q.why)
+    if q is None or tau is None or not angles or q.name.motor or tau.name.motor:
+        return units
+    if not all(joint.revolute for joint in arm.joints):
+        return units
+    fits: dict[str, LinkFit] = {}
+    for unit in dict.fromkeys(("rad", "deg", units.q.value or "rad")):
+        fit = fit_links(model, matrix(table, q) * UNITS[unit].factor, t, matrix(table, tau))
+        fits |= {} if fit is None else {unit: fit}
+    return _judged(units, fits, tau) if fits else units
+
+
+def _judged(units: _Units, fits: dict[str, LinkFit], tau: Group) -> _Units:
+    """Take or refute units by the fit of the torque under each unit of position."""
+    best = min(fits, key=lambda unit: fits[unit].unexplained)
+    own = fits.get(units.q.value or best, fits[best])
+    if min(own.unexplained, fits[best].unexplained) > GUESS.refutes:
+        doubt = "torque and motion do not agree by the robot's own links: other torques, "
+        return replace(units, doubt=f"{doubt}or the order, unit or zero of the joints?")
+    named = UNITS.get(units.tau.value)
+    most = GUESS.gain if named else GUESS.unnamed_gain
+
+    def near(fit: LinkFit) -> bool:  # as large as the links' torque, in N m
+        gains = fit.gains * (named.factor if named else 1.0)
+        return gains.size > 0 and bool(((gains > 1.0 / most) & (gains < most)).all())
+
+    # Gears near 57 make radians of a motor look like degrees of a joint, but for the torque.
+    worse = [GUESS.better * fit.unexplained for name, fit in fits.items() if name != best]
+    proved = fits[best].unexplained < min(GUESS.proves, *worse, 1.0)
+    proved &= best == "rad" or near(fits[best])
+    follows = "the torque follows from the motion by the robot's links"
+    position, torque, doubt = units.q, units.tau, ""
+    if proved and not position.value and not position.why:
+        position = Guess(best, f"{follows} in {best}")
+    elif proved and position.value not in ("", best):
+        position = Guess("", f"says '{position.value}', but {follows} if it is in {best}")
+    own = fits.get(position.value, own)
+    if tau.name.quantity != "torque":
+        return replace(units, q=position)
+    if not near(own):
+        why = f"{np.round(own.gains, 3).tolist()} times what weight and inertia of the robot's "
+        torque = Guess("", f"{why}links ask for: another unit or sign, or the motor's side?")
+    elif proved and position.value and not _own(tau):
+        torque = Guess("N m", f"{follows} in N m")
+    elif torque.value and not proved:
+        share = f"{100.0 * (1.0 - own.unexplained):.0f} %"
+        why = f"named so, but the robot's links explain {share} of it: order, zero, side?"
+        torque = replace(torque, why=why, sure=False)
+    if tau.name.origin == "commanded" and not proved:
+        doubt = "the command is not the torque that the robot's own links ask for"
+    return replace(units, q=position, tau=torque, doubt=doubt)
+
+
+def _robot_lines(files: list[str], problem: str, named: bool) -> list[str]:
+    if len(files) != 1:
+        listed = ", ".join(clean(file, 40) for file in files)
+        return [f'use = "{BLANK}"   # the robot: {listed or "a TOML, a URDF, or a shipped name"}']
+    why = "as --robot says" if named else "check: likely, it lies in the same folder"
+    lines = [f"use = {quoted(files[0])}   # {why}"]
+    lines += [f"# {clean(problem, 300)}"] if problem else []
+    return [*lines, *([f'tip_link = "{BLANK}"'] if "tip_link" in problem else [])]
 
 
 def _torque_kind(group: Group | None) -> str:
@@ -325,78 +329,68 @@ def _time_lines(clock: Clock | None, unit: Guess) -> list[str]:
     return [*lines, *([f'rate = "{BLANK}"   # Hz'] if unit.value == "sample" else [])]
 
 
-def _signal_lines(table: RawTable, roles: Roles, units: _Units) -> list[str]:
-    lines = []
-    for signal, unit in (("q", units.q), ("dq", units.dq), ("tau", units.tau)):
-        group, others = roles.chosen.get(signal), roles.others.get(signal, ())
-        doubt = units.doubt or _unexplained(signal, roles)
-        if signal == "dq":
-            if group and unit.value and not doubt:
-                lines.append(f"dq = {{ {columns_of(group, table)}, unit = {quoted(unit.value)} }}")
-                lines.append(f"    {unit.comment}; remove the line where it was not measured")
-            elif group:
-                lines.append(f"    # left out, a velocity: {columns_of(group, table)}")
-            continue
-        if group is None or doubt:
-            lines.append(f'{signal} = {{ columns = "{BLANK}", unit = "{BLANK}" }}')
-            lines[-1] += "" if group or others else "   # no column looks like it"
-            lines += [f"    # {doubt}"] if doubt and group else []
-            candidates = (*((group,) if group else ()), *others)
-            if candidates and all(g.name.origin == "commanded" for g in candidates):
-                lines.append("    # named commands, or the points of a plan: what was measured?")
-            lines += [f"    # candidate: {columns_of(g, table)}" for g in candidates[:8]]
-            if not candidates and table.text:
-                text = ", ".join(f"{clean(k, 40)} ({clean(v, 80)})" for k, v in table.text.items())
-                lines.append(f"    # no columns of numbers: {clean(text, 300)}")
-            continue
-        lines.append(_signal_line(signal, group, unit, roles, table))
-        lines.append(f"    {unit.comment if unit.why else '# no name says the unit'}")
-        if group.order == "the file" and len(group.columns) > 1:
-            lines.append("    # check: joints in the order of the file, from the base to the tip")
-        lines += [f"    # also there: {columns_of(g, table)}" for g in others[:6]]
-    return lines
+def _velocity_lines(table: RawTable, roles: Roles, units: _Units, time: Guess) -> list[str]:
+    """Return the line of a velocity that is the slope of the position, and says no other unit."""
+    if (group := roles.chosen.get("dq")) is None:
+        return []
+    columns, unit = columns_of(group, table), ""
+    if units.q.value in UNITS and time.value in SECONDS and roles.slope and not units.doubt:
+        size = roles.slope * UNITS[units.q.value].factor / SECONDS[time.value]
+        near, named = _near(size, _SPEEDS), _own(group)
+        unit = next((u for u in near if named in ("", u)), "" if near else named)
+    if not unit:
+        return [f"    # left out, a velocity: {columns}"]
+    why = "check: the slope of the position; remove the line where it was not measured"
+    return [f"dq = {{ {columns}, unit = {quoted(unit)} }}   # {why}"]
 
 
-def _signal_line(signal: str, group: Group, unit: Guess, roles: Roles, table: RawTable) -> str:
+def _signal_lines(signal: str, table: RawTable, roles: Roles, unit: Guess, doubt: str) -> list[str]:
+    """Return the line of `signal`, why it is so, and what else it could be."""
+    group, others = roles.chosen.get(signal), roles.others.get(signal, ())
+    doubt = doubt or _unexplained(signal, roles)
+    if group is None or doubt:
+        candidates = (*((group,) if group else ()), *others)
+        lines = [f'{signal} = {{ columns = "{BLANK}", unit = "{BLANK}" }}']
+        lines += [f"    # {doubt or 'no column looks like it'}"] if doubt or not candidates else []
+        if candidates and all(g.name.origin == "commanded" for g in candidates):
+            lines.append("    # named commands, or the points of a plan: what was measured?")
+        lines += [f"    # candidate: {columns_of(g, table)}" for g in candidates[: GUESS.shown]]
+        if not candidates and table.text:
+            text = ", ".join(f"{clean(k, 40)} ({clean(v, 80)})" for k, v in table.text.items())
+            lines.append(f"    # no columns of numbers: {clean(text, 300)}")
+        return lines
     each = [unit.value] * len(group.columns)
     if not unit.value and not unit.why:  # a unit for each joint, as far as it is named
         each = [canonical_unit(u) if canonical_unit(u) in UNITS else "" for u in group.units]
     words = [quoted(u or BLANK) for u in each]
     said = words[0] if len(set(words)) == 1 else f"[{', '.join(words)}]"
     more = f', counts_per_rev = "{BLANK}"' if unit.value == "counts" else ""
-    motors = {s: g.name.motor for s, g in roles.chosen.items()}
-    more += ', side = "joint"' if any(motors.values()) and not motors[signal] else ""
-    return f"{signal} = {{ {columns_of(group, table)}, unit = {said}{more} }}"
+    motors = [g.name.motor for g in roles.chosen.values()]
+    more += ', side = "joint"' if any(motors) and not group.name.motor else ""
+    lines = [f"{signal} = {{ {columns_of(group, table)}, unit = {said}{more} }}"]
+    lines.append(f"    {unit.comment if unit.why else '# no name says the unit'}")
+    if group.order == "the file" and len(group.columns) > 1:
+        lines.append("    # check: joints in the order of the file, from the base to the tip")
+    return lines + [f"    # also there: {columns_of(g, table)}" for g in others[: GUESS.shown]]
 
 
 def _unexplained(signal: str, roles: Roles) -> str:
-    """Return why the columns of a signal are open; "" where they are not.
+    """Return which word of the columns' names may say more; "" for none.
 
-    A word that only one of position and torque has may say more, and words give no order.
+    A word that position and torque both have is a name of the robot, or of the recorder.
     """
     group, other = (roles.chosen.get(s) for s in ("q", "tau")[:: 1 if signal == "q" else -1])
-    if group is None or signal == "dq":
-        return ""
-    if group.order == "words":
-        return "in which order are these joints, from the base to the tip?"
     known = set(other.name.unknown if other else ())
-    words = {word for word in group.name.unknown if word[1:] and word not in known}
+    words = {word for word in (group.name.unknown if group else ()) if word[1:]} - known
     return f"what does '{clean(min(words), 40)}' say of it?" if words else ""
 
 
-def _files_beside(path: Path) -> list[str]:
-    near = [p for p in sorted(path.parent.iterdir())[: GUESS.most_files] if p.is_file()]
-    others = [quoted(p.name) for p in near if p.suffix == path.suffix and p.name != path.name]
-    return [f"    # if it is in another file: file = {' or '.join(others[:4])}"] if others else []
-
-
-def _drive_lines(roles: Roles) -> list[str]:
+def _drive_lines(roles: Roles, law: str) -> list[str]:
     motor = any(group.name.motor for group in roles.chosen.values())
     tau = roles.chosen.get("tau")
     current = tau is not None and tau.name.quantity == "current"
-    law = "q_motor = N q_joint, tau_joint = N^T tau_motor"
-    lines = [f"{'' if motor or current else '# '}[drive]   # where numbers are motor side: {law}"]
     ratios = "gear ratio of each joint; remove it where the numbers are the joints'"
+    lines = [f"{'' if motor or current else '# '}[drive]   # where numbers are motor side: {law}"]
     lines += [f'transmission = "{BLANK}"   # {ratios}'] if motor else []
     constant = f'torque_constant = "{BLANK}"   # N m/A, motor side: from the data sheet'
     return [*lines, *([constant] if current else [])]

@@ -30,8 +30,7 @@ from pipelines.importers.raw import RawTable
 from pipelines.io.log import Array
 from pipelines.io.units import UNITS
 
-SIGNALS = ("q", "dq", "tau")
-_Column = tuple[str, ColumnName, int | None]  # column, its words, the robot's joint in it
+_QUANTITIES = {"q": ("position",), "dq": ("velocity",), "tau": ("torque", "current")}
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ class Group:
     columns: tuple[str, ...]
     name: ColumnName
     units: tuple[str, ...]  # one a column, "" where neither header nor name says it
-    order: str  # what it rests on: "the robot's names", "numbers", "words", "the file"
+    order: str  # what it rests on: "the robot's names", "numbers", "the file"
 
     @property
     def unit(self) -> str:
@@ -63,7 +62,7 @@ class Roles:
     """The columns of a recording by signal, as far as names and numbers decide."""
 
     clock: Clock | None
-    chosen: dict[str, Group] = field(default_factory=dict)  # of SIGNALS
+    chosen: dict[str, Group] = field(default_factory=dict)  # q, dq, tau
     others: dict[str, tuple[Group, ...]] = field(default_factory=dict)  # further candidates
     slope: float | None = None  # recorded change of q over dq times recorded time
 
@@ -88,140 +87,97 @@ def choose(table: RawTable, joints: Sequence[str], planned: bool = False) -> Rol
     if planned or (clock and {"from", "start"} <= set(words_of(clock.columns[0]))):
         groups = [replace(g, name=replace(g.name, origin="commanded"))
                   if g.name.origin == "plain" else g for g in groups]  # fmt: skip
-    n = len(joints) or _joints_of(groups)
+    sizes = [
+        max((len(g.columns) for g in groups if g.name.quantity == wanted), default=0)
+        for wanted in ("position", "torque", "current")
+    ]
+    n = len(joints) or next(filter(None, sizes), 1)
     roles = Roles(clock)
-    for signal, rank in (("q", _rank_position), ("dq", _rank_velocity), ("tau", _rank_torque)):
-        ranked = ((rank(g.name), g) for g in groups if len(g.columns) == n)
+    for signal in _QUANTITIES:
+        ranked = ((_rank(signal, g.name), g) for g in groups if len(g.columns) == n)
         found = sorted(((key, g) for key, g in ranked if key), key=lambda pair: pair[0])
         best = [g for key, g in found if key == found[0][0]]
         if len(best) == 1 and found[0][0][0] < GUESS.only_offered:
             roles.chosen[signal] = best[0]
         roles.others[signal] = tuple(g for _, g in found if roles.chosen.get(signal) is not g)
     if "q" not in roles.chosen and not roles.others["q"]:
-        roles = _by_slopes(table, groups, roles, n)
+        _by_slopes(table, groups, roles, n)
     if {"q", "dq"} <= roles.chosen.keys():
         q, dq = (matrix(table, roles.chosen[signal]) for signal in ("q", "dq"))
         roles = replace(roles, slope=slope_of(q, dq, clock.values if clock else None))
     return roles
 
 
-def _rank_position(name: ColumnName) -> tuple[int, int] | None:
-    if name.quantity != "position" or name.partial:
+def _rank(signal: str, name: ColumnName) -> tuple[int, int] | None:
+    """Return how far a group is from a measurement of `signal`, and its unknown words.
+
+    A torque comes before a current, and this before a command; parts of it are only offered.
+    """
+    if name.quantity not in _QUANTITIES[signal] or (name.partial and signal != "tau"):
         return None
-    places = {"measured": 0, "plain": 1, "commanded": GUESS.only_offered}
-    return places[name.origin] + name.motor, len(name.unknown)
-
-
-def _rank_velocity(name: ColumnName) -> tuple[int, int] | None:
-    if name.quantity != "velocity" or name.partial or name.origin == "commanded":
-        return None
-    return int(name.origin == "plain") + name.motor, len(name.unknown)
-
-
-def _rank_torque(name: ColumnName) -> tuple[int, int] | None:
-    """Return a torque before a current, and this before a command; parts are only offered."""
-    if name.quantity not in ("torque", "current"):
-        return None
-    if name.partial:
-        return GUESS.only_offered, len(name.unknown)
-    places = {"measured": 0, "plain": 1, "commanded": 3}
-    current = 2 if name.quantity == "current" else 0
-    if current and name.origin == "commanded":
-        return GUESS.only_offered, len(name.unknown)
-    return max(places[name.origin], current), len(name.unknown)
-
-
-def _joints_of(groups: Sequence[Group]) -> int:
-    """Return how many columns the largest group of positions, or else of torques, has."""
-    for wanted in ("position", "torque", "current"):
-        sizes = [len(g.columns) for g in groups if g.name.quantity == wanted]
-        if sizes:
-            return max(sizes)
-    return 1
+    current = name.quantity == "current"
+    place = {"measured": 0, "plain": 1, "commanded": 3}[name.origin]
+    place = max(place, 2) if current else place + (name.motor and signal != "tau")
+    commanded = name.origin == "commanded" and (signal != "tau" or current)
+    return GUESS.only_offered if name.partial or commanded else place, len(name.unknown)
 
 
 def _groups(table: RawTable, joints: Sequence[str]) -> list[Group]:
-    """Return columns of one quantity and equal words together."""
-    labels = [_label(name) for name in joints]
-    alike: dict[object, list[_Column]] = defaultdict(list)
+    """Return columns of one quantity and equal words together, in the order of the joints."""
+    labels = [[word for word in words_of(name) if word not in NOISE] for name in joints]
+    alike = defaultdict[object, list[tuple[str, ColumnName, int]]](list)
     for column in table.columns:
-        place, rest = _place_of(column, labels)
+        joint, rest = _joint_in(column, labels)
         name = read_name(rest, table.units.get(column, ""))
-        alike[_kind(name), name.unknown, place is None].append((column, name, place))
-    groups, lonely = [], defaultdict[object, list[_Column]](list)
-    listed = _listed_order(table, joints)
+        kind = (name.quantity, name.origin, name.motor, name.partial, name.role, name.unknown)
+        alike[*kind, joint < 0].append((column, name, joint))
+    listed, groups = _listed_order(table, joints), []
     for members in alike.values():
-        _, name, place = members[0]
-        if len(members) == 1 and place is None and name.unknown and not name.numbers:
-            lonely[_kind(name)] += members  # named after a joint that no robot explains: "waist"
-        else:
-            groups.append(_group(members, listed))
-    for members in lonely.values():
-        group = _group(members, listed)
-        if len(members) > 1 and group.order == "the file":
-            group = replace(group, order="words", name=replace(group.name, unknown=()))
-        groups.append(group)
+        order = "the file"
+        numbers = zip(*(name.numbers for _, name, _ in members), strict=False)
+        varying = [k for k, x in enumerate(numbers) if len(set(x)) == len(members) > 1]
+        if members[0][2] >= 0:
+            members, order = sorted(members, key=lambda member: member[2]), "the robot's names"
+        elif listed and len(members) == len(listed):
+            members = sorted(members, key=lambda m: m[1].numbers[varying[0]] if varying else 0)
+            members, order = [members[k] for k in listed], "the robot's names"
+        elif varying:
+            members = sorted(members, key=lambda member: member[1].numbers[varying[0]])
+            order = "numbers"
+        columns, names, _ = zip(*members, strict=True)
+        groups.append(Group(columns, names[0], tuple(name.unit for name in names), order))
     return groups
 
 
-def _group(members: list[_Column], listed: list[int] | None) -> Group:
-    """Return columns in the order of the robot's joints or of their numbers, else of the file."""
-    order = "the file"
-    places = [name.numbers for _, name, _ in members]
-    varying = [k for k, x in enumerate(zip(*places, strict=False)) if len(set(x)) == len(members)]
-    if all(place is not None for *_, place in members):
-        members, order = sorted(members, key=lambda member: member[2] or 0), "the robot's names"
-    elif varying and len(members) > 1:
-        k = varying[0]
-        members, order = sorted(members, key=lambda member: member[1].numbers[k]), "numbers"
-    if listed and order != "the robot's names" and len(members) == len(listed):
-        members, order = [members[k] for k in listed], "the robot's names"
-    units = tuple(name.unit for _, name, _ in members)
-    return Group(tuple(column for column, *_ in members), members[0][1], units, order)
-
-
-def _kind(name: ColumnName) -> tuple[object, ...]:
-    return name.quantity, name.origin, name.motor, name.partial, name.role
-
-
-def _label(joint: str) -> list[str]:
-    """Return the words of a joint's name that no other column has: "wrist 1" of wrist_1_joint."""
-    return [word for word in words_of(joint) if word not in NOISE]
-
-
-def _place_of(column: str, labels: Sequence[list[str]]) -> tuple[int | None, str]:
-    """Return which joint a column names, and the words that are left of it."""
+def _joint_in(column: str, labels: Sequence[list[str]]) -> tuple[int, str]:
+    """Return which joint a column names (-1 none), and the words that are left of it."""
     words = words_of(column)
-    best: tuple[int, int, int] | None = None
-    for joint, label in enumerate(labels):
-        told = [word for word in label if not word.isdecimal() and not read_name(word).role]
-        starts = range(len(words) - len(label) + 1) if told else ()
-        for start in starts:
-            if words[start : start + len(label)] == label:
-                best = max(best or (0, 0, 0), (len(label), start, joint))
-    if best is None:
-        return None, column
-    size, start, joint = best
-    return joint, "_".join(_spelled(column, words[:start] + words[start + size :]))
+    size, start, joint = max(
+        (
+            (len(label), start, joint)
+            for joint, label in enumerate(labels)
+            if any(not word.isdecimal() and not read_name(word).role for word in label)
+            for start in range(len(words) - len(label) + 1)
+            if words[start : start + len(label)] == label
+        ),
+        default=(0, 0, -1),
+    )
+    if joint < 0:
+        return joint, column
+    left = words[:start] + words[start + size :]
+    # Words as the column writes them, so that a unit such as Nm stays one.
+    parts = [part for part in re.split(r"[\W_]+", column) if part and {*words_of(part)} <= {*left}]
+    covered = {word for part in parts for word in words_of(part)}
+    return joint, "_".join([*(word for word in left if word not in covered), *parts])
 
 
-def _spelled(column: str, words: Sequence[str]) -> list[str]:
-    """Return words as the column writes them, so that a unit such as Nm stays one."""
-    parts = [part for part in re.split(r"[\W_]+", column) if part]
-    whole = [part for part in parts if set(words_of(part)) <= set(words)]
-    covered = {word for part in whole for word in words_of(part)}
-    return [*(word for word in words if word not in covered), *whole]
-
-
-def _listed_order(table: RawTable, joints: Sequence[str]) -> list[int] | None:
+def _listed_order(table: RawTable, joints: Sequence[str]) -> list[int]:
     """Return the columns in the robot's order where texts of the file list its joints' names."""
     said = " ".join((*table.text.values(), *table.notes))
     found = [re.search(rf"(?<!\w){re.escape(joint)}(?!\w)", said) for joint in joints]
-    places = [match.start() if match else -1 for match in found]
-    if len(places) <= 1 or min(places) < 0:
-        return None
-    rank = np.argsort(np.argsort(places))
-    return [int(k) for k in rank]
+    places = [match.start() for match in found if match]
+    complete = len(places) == len(joints) > 1
+    return np.argsort(np.argsort(places)).tolist() if complete else []
 
 
 def _clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
@@ -245,11 +201,10 @@ def _clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
         message = "does not rise from row to row: several rows a sample, or too few digits?"
         remedy = "export one row a sample, and its time with all digits"
         raise InputRejected("S11", message, where, remedy)
-    if not rising:
-        plain = [c for c in [*table.columns][:1] if not of[c].quantity and len(table.columns) > 2]  # noqa: PLR2004
-        rising = [
-            c for c in plain if _rises(table.columns[c]) and _unevenness(table, c) < GUESS.even
-        ]
+    first = next(iter(table.columns))
+    if not rising and not of[first].quantity and len(table.columns) > GUESS.least:
+        even = _rises(table.columns[first]) and _unevenness(table, first) < GUESS.even
+        rising = [first] * even
     if rising:
         best = min(rising, key=lambda c: round(_unevenness(table, c), 2))
         return Clock((best,), (unit.get(best, ""),), table.columns[best])
@@ -282,17 +237,14 @@ def slope_of(q: Array, dq: Array, t: Array | None) -> float | None:
     """
     if q.shape != dq.shape:
         return None
-    step = np.ones(len(q) - 1) if t is None else np.diff(t)
-    inside = np.cumsum(0.5 * (dq[1:] + dq[:-1]) * step[:, None], axis=0)
-    stride = max(1, len(inside) // GUESS.stretches)
-    a, b = (
-        q[1:][stride::stride] - q[1:][:-stride:stride],
-        inside[stride::stride] - inside[:-stride:stride],
-    )
     moves = (np.ptp(q, axis=0) > 0.0) & (np.ptp(dq, axis=0) > 0.0)
     if not moves.any():
         return None
-    a, b = a[:, moves], b[:, moves]
+    step = np.ones(len(q) - 1) if t is None else np.diff(t)
+    inside = np.cumsum(0.5 * (dq[1:] + dq[:-1]) * step[:, None], axis=0)
+    stride = max(1, len(inside) // GUESS.stretches)
+    a = np.diff(q[1::stride, moves], axis=0)
+    b = np.diff(inside[::stride, moves], axis=0)
     inner, size_a, size_b = (a * b).sum(axis=0), (a**2).sum(axis=0), (b**2).sum(axis=0)
     alike = inner / np.sqrt(np.maximum(size_a * size_b, 1e-300))
     ratios = inner / np.maximum(size_b, 1e-300)
@@ -301,7 +253,7 @@ def slope_of(q: Array, dq: Array, t: Array | None) -> float | None:
     return middle if (np.abs(alike) > GUESS.like).all() and middle > 0.0 and same else None
 
 
-def _by_slopes(table: RawTable, groups: Sequence[Group], roles: Roles, n: int) -> Roles:
+def _by_slopes(table: RawTable, groups: Sequence[Group], roles: Roles, n: int) -> None:
     """Find positions and velocities among blocks of columns without names; the rest is a torque."""
     clock = roles.clock.columns if roles.clock else ()
     unnamed = {c for g in groups if not g.name.quantity for c in g.columns}
@@ -309,28 +261,25 @@ def _by_slopes(table: RawTable, groups: Sequence[Group], roles: Roles, n: int) -
     if n <= 1 and columns:
         n = next((k for k in range(GUESS.most_joints, 0, -1) if len(columns) == 3 * k), 1)
     blocks = [columns[k : k + n] for k in range(0, len(columns), n)]
-    if not columns or len(columns) % n or len(blocks) > GUESS.most_blocks:
-        named = tuple(g for g in groups if not g.name.quantity and len(g.columns) > 1)
-        return replace(roles, others={s: roles.others[s] or named for s in SIGNALS})
-    name = read_name("")
-    made = [Group(tuple(block), name, ("",) * n, "the file") for block in blocks]
-    t = roles.clock.values if roles.clock else None
-    values = [matrix(table, g) for g in made]
-    pairs = [
-        (a, b)
-        for a, b in itertools.permutations(range(len(made)), 2)
-        if slope_of(values[a], values[b], t) is not None
-    ]
-    pairs = [(a, b) for a, b in pairs if a not in {derived for _, derived in pairs}]
-    chosen, others = dict(roles.chosen), dict(roles.others)
-    if len(pairs) == 1:
-        (a, b) = pairs[0]
-        chosen |= {"q": made[a], "dq": made[b]}
-        rest = [g for k, g in enumerate(made) if k not in (a, b)]
-        if len(rest) == 1 and "tau" not in chosen and not others["tau"]:
-            chosen["tau"] = rest[0]
-        elif "tau" not in chosen:
-            others["tau"] = others["tau"] or tuple(rest)
-    else:
-        others = {s: others[s] or tuple(made) for s in SIGNALS}
-    return replace(roles, chosen=chosen, others=others)
+    pairs: list[tuple[int, int]] = []
+    made = [g for g in groups if not g.name.quantity and len(g.columns) > 1]
+    if columns and len(columns) % n == 0 and len(blocks) <= GUESS.most_blocks:
+        made = [Group(tuple(b), read_name(""), ("",) * n, "the file") for b in blocks]
+        t = roles.clock.values if roles.clock else None
+        values = [matrix(table, g) for g in made]
+        pairs = [
+            (a, b)
+            for a, b in itertools.permutations(range(len(made)), 2)
+            if slope_of(values[a], values[b], t) is not None
+        ]
+        pairs = [(a, b) for a, b in pairs if a not in {derived for _, derived in pairs}]
+    if len(pairs) != 1:
+        roles.others.update({s: roles.others[s] or tuple(made) for s in _QUANTITIES})
+        return
+    ((a, b),) = pairs
+    roles.chosen.update(q=made[a], dq=made[b])
+    rest = tuple(g for k, g in enumerate(made) if k not in (a, b))
+    if "tau" not in roles.chosen and not roles.others["tau"]:
+        roles.others["tau"] = rest
+        if len(rest) == 1:
+            roles.chosen["tau"], roles.others["tau"] = rest[0], ()
