@@ -127,8 +127,6 @@ class Repair:
     most_missing: float = 0.2  # of the samples
     finest: float = 4.0  # times the recorded rate: the highest rate of resampling
     lengths: float = 1e-3  # of the samples: files of one recording may differ by so many
-    previews: int = 3  # logs that the report draws
-    preview_points: int = 150
 
 
 ARRAYS = Arrays()
