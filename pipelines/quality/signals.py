@@ -1,8 +1,7 @@
-"""Check the samples of a log: missing, absurd, constant, saturated, glitches, wraps, copies."""
+"""Check the samples of a log: missing, absurd, constant, saturated, glitches, wraps, resolution."""
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,7 +11,7 @@ from pipelines.io import schema
 from pipelines.io.limits import ABSURD, GAP_LIMIT, percent, sentinels
 from pipelines.quality.config import CONFIG
 from pipelines.quality.segments import long_blocks, torque_limit
-from pipelines.quality.subject import NotTested, Place, Subject, flagged, many, spread
+from pipelines.quality.subject import NotTested, Subject, flagged, many, spread
 
 _REPAIR = "look at this channel's cable and its place in the recorder, and record again"
 
@@ -24,24 +23,25 @@ def missing_samples(s: Subject) -> list[Check]:
     for name in (name for name in s.log.signals if name in schema.SIGNALS and name != "t"):
         undefined = np.isnan(s.log[name])
         for j, at in flagged(undefined):
-            place = Place(signal=name, joint=j, sample=int(at[0]))
             whole, blocks = at.size == len(undefined), len(long_blocks(undefined[:, j]))
             words = f"{name} of joint {j + 1}: {at.size} of {len(undefined)} samples are missing"
-            if whole:
-                words = f"{name} of joint {j + 1}: there is no measurement at all"
+            words = f"{name} of joint {j + 1}: there is no measurement at all" if whole else words
+            level: Level = "repair"
+            code, remedy, gate = "D02", _REPAIR, False
             if name not in needed:
-                code, remedy = "D02" if whole else "D01", "leave the signal out, or record it again"
-                found.append(s.say(code, "warn", words, remedy, whole, **place))
+                code, level, gate = "D02" if whole else "D01", "warn", whole
+                remedy = "leave the signal out, or record it again"
             elif at.size > CONFIG.gone * len(undefined):
-                found.append(s.say("D02", "reject", words, _REPAIR, **place))
+                level = "reject"
             elif blocks:
                 words = f"{at.size} samples of {name} are missing, {many(blocks, 'time')} more "
                 words += f"than {GAP_LIMIT} in a row; the log is split there"
-                found.append(s.say("D02", "repair", words, _REPAIR, **place))
             else:
                 words = f"{many(at.size, 'sample')} of {name} missing, never more than {GAP_LIMIT} "
                 words += "in a row; treated as not measured"
-                found.append(s.say("D01", "repair", words, "none needed if few", **place))
+                code, remedy = "D01", "none needed if few"
+            say = s.say(code, level, words, remedy, gate, signal=name, joint=j, sample=int(at[0]))
+            found.append(say)
     return found or s.ok("D01", "no sample is missing")
 
 
@@ -60,8 +60,7 @@ def absurd_samples(s: Subject) -> list[Check]:
             words += f"measurement (samples {samples}{', …' * bool(at[8:].size)})"
             remedy = "mark what was not measured as NaN, or look at the sensor"
             level: Level = "repair" if at.size <= CONFIG.few * s.log.n_samples else "reject"
-            place = Place(signal=name, joint=j, sample=int(at[0]))
-            found.append(s.say("D03", level, words, remedy, **place))
+            found.append(s.say("D03", level, words, remedy, signal=name, joint=j, sample=at[0]))
     return found or s.ok("D03", "no infinite, astronomical or filler value")
 
 
@@ -79,9 +78,8 @@ def constant_channels(s: Subject) -> list[Check]:
             words = f"q of joint {j + 1} is constant ({q[0]:.6g})"
             found.append(s.say("D04", "reject", words, _REPAIR, signal="q", joint=j))
         moves = j in s.moving or s.travel[j] > CONFIG.moved
-        # a constant torque drives the joint
-        steady = log.experiment == "friction" and tau[0] != 0.0
-        if torque[j] == 0.0 and moves and not steady:
+        driven = log.experiment == "friction" and tau[0] != 0.0  # by a constant torque
+        if torque[j] == 0.0 and moves and not driven:
             words = f"tau of joint {j + 1} is constant ({tau[0]:.6g}) while the joint moves"
             found.append(s.say("D04", "reject", words, _REPAIR, signal="tau", joint=j))
     return found or s.ok("D04", "every channel that has to move does")
@@ -95,13 +93,15 @@ def saturation(s: Subject) -> list[Check]:
         where = f"at or beyond the described limit of {limit:.4g}, up to {peak:.4g}"
         if least < 0.99 * limit:
             where = f"at a flat top at {least:.4g}"
-        share, unit = at.size / len(tau), s.unit("tau", j)
-        words = f"{percent(share, 2)} of the torque samples lie {where} {unit}; no fit uses them"
+        share = at.size / len(tau)
+        words = f"{percent(share, 2)} of the torque samples lie {where} {s.unit('tau', j)}; no fit "
+        words += "uses them"
         remedy = "move slower or with less acceleration; a saturated drive hides what the arm needs"
         if peak > CONFIG.twice * limit:
             remedy += "; or look for a gear ratio or torque constant applied twice"
-        place = Place(signal="tau", joint=j, sample=int(s.good.kept[at[0]]))
-        found.append(s.say("D05", "warn", words, remedy, share > CONFIG.saturated, **place))
+        gate, sample = share > CONFIG.saturated, s.good.kept[at[0]]
+        say = s.say("D05", "warn", words, remedy, gate, signal="tau", joint=j, sample=sample)
+        found.append(say)
     peaks = s.with_units("tau", np.nanmax(tau, axis=0, initial=0.0).tolist())
     return found or s.ok("D05", f"the torque stays below its limits, at most {peaks}", signal="tau")
 
@@ -112,27 +112,27 @@ def glitches(s: Subject) -> list[Check]:
     for name, flags in (("q", s.good.position_spikes), ("tau", s.good.torque_spikes)):
         for j, at in flagged(flags):
             words = f"{many(at.size, 'sample')} of {name} too far from the neighbours; left out"
-            place = Place(signal=name, joint=j, sample=int(s.good.kept[at[0]]))
-            found.append(s.say("D06", "repair", words, remedy, **place))
+            sample = s.good.kept[at[0]]
+            found.append(s.say("D06", "repair", words, remedy, signal=name, joint=j, sample=sample))
     return found or s.ok("D06", "no sample is far from its neighbours")
 
 
 def wraps(s: Subject) -> list[Check]:
     """D07: the position does not jump, by a turn or otherwise."""
-    found = []
-    wrapped, jumped = np.diff(s.good.wrapped, axis=0), np.diff(s.good.log.q, axis=0)
-    for j, at in flagged(wrapped != 0.0):
-        by = f"{abs(wrapped[at[0], j]):.6g} {s.unit('q', j)}"
-        words = f"the encoder wraps {many(at.size, 'time')} by {by}; unwrapped"
-        place = Place(signal="q", joint=j, sample=int(s.good.kept[at[0] + 1]))
-        found.append(s.say("D07", "warn", words, "let the recorder count turns", **place))
-    for j, at in flagged(s.good.jumped[1:]):
-        by = f"{jumped[at[0], j]:.4g} {s.unit('q', j)}"
-        words = f"the position jumps {many(at.size, 'time')}, first by {by}, which is no turn and "
-        words += "no counter's range; the log is split there"
-        place = Place(signal="q", joint=j, sample=int(s.good.kept[at[0] + 1]))
-        remedy = "look at the encoder: it loses counts"
-        found.append(s.say("D07", "warn", words, remedy, True, **place))
+    found, wrapped = [], np.diff(s.good.wrapped, axis=0)
+    jumped = np.where(s.good.jumped[1:], np.diff(s.good.log.q, axis=0), 0.0)
+    for steps, lost in ((wrapped, False), (jumped, True)):
+        for j, at in flagged(steps != 0.0):
+            times, size = many(at.size, "time"), abs(steps[at[0], j])
+            words = f"the encoder wraps {times} by {size:.6g} {s.unit('q', j)}; unwrapped"
+            remedy = "let the recorder count turns"
+            if lost:
+                words = f"the position jumps {times}, first by {size:.4g} {s.unit('q', j)}, which "
+                words += "is no turn and no counter's range; the log is split there"
+                remedy = "look at the encoder: it loses counts"
+            sample = s.good.kept[at[0] + 1]
+            say = s.say("D07", "warn", words, remedy, lost, signal="q", joint=j, sample=sample)
+            found.append(say)
     return found or s.ok("D07", "the position neither wraps nor jumps", signal="q")
 
 
@@ -161,27 +161,5 @@ def resolution(s: Subject) -> Sequence[Check | NotTested]:
     return found
 
 
-def identical(s: Subject) -> list[Check]:
-    """S13: no two channels hold the same samples; two sensors never do."""
-    alike: dict[bytes, list[tuple[str, int]]] = defaultdict(list)
-    for name in ("q", "tau"):
-        for j in np.flatnonzero(spread(s.log[name]) > 0).tolist():
-            alike[s.log[name][:, j].tobytes()].append((name, j))
-    found, remedy = [], "correct the column map of the import: one column serves two channels"
-    for group in (group for group in alike.values() if len(group) > 1):
-        names, (signal, j) = [f"{name} of joint {j + 1}" for name, j in group], group[-1]
-        words = f"{' and '.join(names)} are the same, sample for sample"
-        found.append(s.say("S13", "warn", words, remedy, True, signal=signal, joint=j))
-    return found
-
-
-SIGNAL_CHECKS = (
-    missing_samples,
-    absurd_samples,
-    constant_channels,
-    saturation,
-    glitches,
-    wraps,
-    resolution,
-    identical,
-)
+SIGNAL_CHECKS = (missing_samples, absurd_samples, constant_channels, saturation, glitches, wraps,
+                 resolution)  # fmt: skip

@@ -5,23 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, TypedDict, Unpack
+from typing import Any, ClassVar
 
 import numpy as np
 
-from pipelines.errors import Check, Level, clean
+from pipelines.errors import Check, Level
 from pipelines.io.limits import FEWEST
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.schema import joint_unit
 from pipelines.quality.segments import Indices, Mask, Usable, usable
-
-
-class Place(TypedDict, total=False):
-    """Where in a log something was found."""
-
-    signal: str
-    joint: int | None  # from 0
-    sample: int | None  # of the recording
 
 
 @dataclass(frozen=True)
@@ -79,17 +71,6 @@ class Subject:
             words.append(f"{value:.3g}{unit}" if shown else "not visible")
         return ", ".join(words)
 
-    def place(
-        self, *, signal: str = "", joint: int | None = None, sample: int | None = None
-    ) -> str:
-        """Return where: file, signal, joint (from 0), sample of the recording."""
-        parts = [self.log.source or self.log.name]
-        parts += [f"signal {signal}"] if signal else []
-        parts += [f"joint {joint + 1}"] if joint is not None else []
-        if sample is not None:
-            parts.append(f"sample {sample}, t = {self.log.t[sample]:.6g} s")
-        return ", ".join(parts)
-
     def say(
         self,
         code: str,
@@ -97,16 +78,24 @@ class Subject:
         message: str,
         remedy: str = "",
         gate: bool = False,
-        **place: Unpack[Place],
+        **place: Any,
     ) -> Check:
-        return Check.of(code, level, message, where=self.place(**place), remedy=remedy, gate=gate)
+        """Return a check with its place: signal, joint (from 0), sample of the recording."""
+        signal, joint, sample = (place.get(key) for key in ("signal", "joint", "sample"))
+        parts = [self.log.source or self.log.name]
+        parts += [f"signal {signal}"] if signal else []
+        parts += [f"joint {joint + 1}"] if joint is not None else []
+        if sample is not None:
+            parts.append(f"sample {sample}, t = {self.log.t[sample]:.6g} s")
+        return Check.of(code, level, message, ", ".join(parts), remedy, gate=gate)
 
     def ok(self, code: str, message: str, *, signal: str = "") -> list[Check]:
         return [self.say(code, "ok", message, signal=signal)]
 
     def cannot_tell(self, code: str, reason: str, *, signal: str = "") -> list[NotTested]:
         """Return what this log cannot show, which is not counted as passed."""
-        return [NotTested(f"RRID-{code}", clean(self.place(signal=signal)), clean(reason))]
+        check = self.say(code, "ok", reason, signal=signal)
+        return [NotTested(check.code, check.where, check.message)]
 
 
 def many(number: int, thing: str) -> str:

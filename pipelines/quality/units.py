@@ -46,8 +46,6 @@ def torque_unit(s: Subject) -> Sequence[Check | NotTested]:
         if CONFIG.small <= peak.max() * factor <= CONFIG.limit_slack:
             words += f"; this looks like {smaller} ({1.0 / factor:g} times too large)"
             remedy = f"write so to the file: {_written('tau', smaller)}; {remedy}"
-    if ((peak >= CONFIG.small) & (peak <= 1.0)).any():  # a unit is that of all joints
-        words += "; or its controller winds up, for other joints are within their limits"
     level: Level = "warn" if s.log.torque == "measured" else "reject"
     return [s.say("S05", level, words, remedy, True, signal="tau", joint=j)]
 
