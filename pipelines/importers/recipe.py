@@ -27,9 +27,10 @@ scale, sign, unit -> torque constant -> transmission -> offset -> resampling.
 from __future__ import annotations
 
 import datetime
+import itertools
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
@@ -210,7 +211,6 @@ _SECTIONS: dict[str, type] = {
 _DRAFT = "rrrid import --guess FILE drafts a recipe"
 _POSITIVE = ("rate", "sample_time", "longest_gap", "counts_per_rev", "wrap", "period",
              "torque_constant")  # fmt: skip
-_REFERENCES = ("q_ref", "dq_ref", "ddq_ref")
 Problems = Iterator[tuple[str, str, str]]  # code, message, remedy; the first one is raised
 
 
@@ -232,8 +232,7 @@ def parse_recipe(text: str, where: object = "") -> Recipe:
 
     try:
         table = parse_toml(text)
-        _date(table, where)
-    except (ValueError, RecursionError) as problem:
+    except ValueError as problem:
         message = f"the recipe is not valid TOML: {problem}"
         remedy = "correct that line; strings need quotes, tables [ ]"
         raise UsageError("C01", message, where, remedy) from None
@@ -242,9 +241,9 @@ def parse_recipe(text: str, where: object = "") -> Recipe:
         remedy = f"replace the blank marked {BLANK} at {blanks[0]}{more}; the draft says what"
         message = f"'{blanks[0]}' is still marked {BLANK}"
         raise UsageError("C02", message, where, f"{remedy} belongs there")
-    _bounds(table, where)
     if "where" in table:
         raise UsageError("C01", "'where' is not a key of a recipe", where, "remove it")
+    table = {key: _sound(value, key, key, where) for key, value in table.items()}
     try:
         # TOML's own dates become text, for the type check to complain of.
         recipe = TypeAdapter(Recipe).validate_json(json.dumps(table, default=str), strict=True)
@@ -255,79 +254,66 @@ def parse_recipe(text: str, where: object = "") -> Recipe:
         found.found += [_explain(error, where) for error in reversed(places.values())]
         found.raise_all()
         raise  # never reached: there is an error at least
-    except RecursionError:
-        raise UsageError("C02", "the recipe is nested too deeply", where, _DRAFT) from None
-    for check in (_format, _signals, _times):
-        for code, message, remedy in check(recipe):
-            kind = UsageError if code.startswith("C") else InputRejected
-            raise kind(code, message, where, remedy)
+    for code, message, remedy in itertools.chain(_format(recipe), _signals(recipe), _times(recipe)):
+        kind = UsageError if code.startswith("C") else InputRejected
+        raise kind(code, message, where, remedy)
     return recipe
 
 
-def _leaves(value: object, path: str = "", key: str = "") -> Iterator[tuple[str, str, object]]:
-    """Yield (place, key, value) of all in a TOML table that is no table and no list."""
-    if isinstance(value, dict):
-        for name, inner in value.items():
-            yield from _leaves(inner, f"{path}.{name}".lstrip("."), str(name))
-    elif isinstance(value, list):
-        for i, inner in enumerate(value, start=1):
-            yield from _leaves(inner, f"{path}[{i}]", key)
-    else:
-        yield path, key, value
-
-
-def blanks_of(table: dict[str, Any]) -> list[str]:
+def blanks_of(value: object, path: str = "") -> list[str]:
     """Return the places of what --guess could not know and is not yet filled in."""
-    return [path for path, _, x in _leaves(table) if isinstance(x, str) and BLANK in x.upper()]
+    inner: Iterable[tuple[str, object]] = ()
+    if isinstance(value, dict):
+        inner = ((f"{path}.{name}".lstrip("."), x) for name, x in value.items())
+    elif isinstance(value, list):
+        inner = ((f"{path}[{i}]", x) for i, x in enumerate(value, start=1))
+    elif isinstance(value, str) and BLANK in value.upper():
+        return [path]
+    return [place for name, x in inner for place in blanks_of(x, name)]
 
 
-def _bounds(table: dict[str, Any], where: object) -> None:
-    """C02: refuse a number that is not finite or out of its bounds."""
-    for path, key, value in _leaves(table):
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or path.startswith(("robot.", "missing.")):
-            continue
-        try:
-            x = float(value)  # type: ignore[arg-type]
-        except OverflowError:  # an integer of hundreds of digits
-            x = math.inf
-        said = ""
-        if not math.isfinite(x):
-            said, remedy = "must be a finite number", "correct the number"
-        elif abs(x) > RECIPE.largest:
-            said, remedy = f"must lie within ±{RECIPE.largest:g}", "correct it, or its unit"
-        elif key in _POSITIVE and x <= 0.0:
-            said, remedy = "must be above 0", "correct the number"
-        elif key == "sign" and abs(x) != 1.0:
-            said, remedy = "must be 1 or -1", "use scale for other factors"
-        elif key in ("joint", "column", "columns") and (x < 1 or x != int(x)):
-            said, remedy = "must be 1 or more", "joints and columns count from 1"
-        if said:
-            raise UsageError("C02", f"'{path}' is {x}, {said}", where, remedy)
+def _sound(value: Any, path: str, key: str, where: object) -> Any:
+    """Return a value of TOML, dates as UTC in text; C02 where a number is out of its bounds."""
+    if isinstance(value, dict):
+        return {name: _sound(x, f"{path}.{name}", name, where) for name, x in value.items()}
+    if isinstance(value, list):
+        return [_sound(x, f"{path}[{i}]", key, where) for i, x in enumerate(value, start=1)]
+    if key == "recorded":
+        return _utc(value, path, where)
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not number or path.startswith(("robot.", "missing.")):
+        return value
+    try:
+        x = float(value)
+    except OverflowError:  # an integer of hundreds of digits
+        x = math.inf
+    said = ""
+    if not math.isfinite(x):
+        said, remedy = "must be a finite number", "correct the number"
+    elif abs(x) > RECIPE.largest:
+        said, remedy = f"must lie within ±{RECIPE.largest:g}", "correct it, or its unit"
+    elif key in _POSITIVE and x <= 0.0:
+        said, remedy = "must be above 0", "correct the number"
+    elif key == "sign" and abs(x) != 1.0:
+        said, remedy = "must be 1 or -1", "use scale for other factors"
+    elif key in ("joint", "column", "columns") and (x < 1 or x != int(x)):
+        said, remedy = "must be 1 or more", "joints and columns count from 1"
+    if said:
+        raise UsageError("C02", f"'{path}' is {x}, {said}", where, remedy)
+    return value
 
 
-def _date(table: dict[str, Any], where: object) -> None:
-    """Write `recorded` of [log] and of every [[file]] as UTC, in text.
-
-    Raises:
-        UsageError: C02, a time without its offset, which is another hour in every country.
-    """
-    cases = table["file"] if isinstance(table.get("file"), list) else []
-    owners = [("log", table.get("log"))]
-    owners += [(f"file[{i}]", case) for i, case in enumerate(cases, start=1)]
-    for place, owner in owners:
-        if not isinstance(owner, dict) or "recorded" not in owner:
-            continue
-        value = owner["recorded"]
-        try:
-            time = datetime.datetime.fromisoformat(str(value))
-        except ValueError:
-            time = None
-        if time is None or time.tzinfo is None:
-            message = f"'{place}.recorded' is '{value}', no date and time with its offset from UTC"
-            remedy = "write 2024-05-17T11:30:00+02:00, or with Z; or leave it out"
-            raise UsageError("C02", message, where, remedy)
-        owner["recorded"] = time.astimezone(datetime.UTC).isoformat().replace("+00:00", "Z")
+def _utc(value: object, path: str, where: object) -> str:
+    """Return a date and time in UTC; C02 without its offset, which is not the same everywhere."""
+    try:
+        time = datetime.datetime.fromisoformat(str(value))
+    except ValueError:
+        time = datetime.datetime.min
+    if time.tzinfo is None:
+        message = f"'{path}' is '{value}', no date and time with its offset from UTC"
+        remedy = "write 2024-05-17T11:30:00+02:00, or with Z; or leave it out"
+        raise UsageError("C02", message, where, remedy)
+    return time.astimezone(datetime.UTC).isoformat().replace("+00:00", "Z")
 
 
 def _place(error: Any) -> list[Any]:
@@ -375,15 +361,14 @@ def _signals(recipe: Recipe) -> Problems:
             remedy = f"signals: {', '.join(known)}; time has its own table [time]"
             yield "C01", f"'signals.{name}' is not a signal{did_you_mean(name, known)}", remedy
         if (spec.columns is None) == (spec.column is None):
-            remedy = 'write columns = "q_{j}", or columns = ["a", "b", "c"]'
             message = f"'signals.{name}' needs columns (a list, a pattern or a name), once"
-            yield "C02", message, remedy
+            yield "C02", message, 'write columns = "q_{j}", or columns = ["a", "b", "c"]'
         units = spec.unit if isinstance(spec.unit, tuple) else (spec.unit,)
         if "counts" in units and spec.counts_per_rev is None:
             message = f"'signals.{name}' is in counts: counts_per_rev is missing"
             yield "C02", message, "add counts_per_rev"
-    references = [name for name in _REFERENCES if name in recipe.signals]
-    if references and len(references) < len(_REFERENCES):
+    references = [name for name in ("q_ref", "dq_ref", "ddq_ref") if name in recipe.signals]
+    if len(references) in (1, 2):
         message = f"{', '.join(references)} alone: q_ref, dq_ref and ddq_ref come together"
         yield "C02", message, "map all three, or none"
     for name in ("q", "tau"):
