@@ -10,10 +10,10 @@ name) are two more.
 
 from __future__ import annotations
 
-import hashlib
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from hashlib import sha256
 from typing import Final
 
 from pipelines.errors import Check
@@ -100,7 +100,9 @@ def check_together(opened: Sequence[Opened], subjects: Sequence[Subject]) -> tup
         remedy = "keep one of them; a copy counts twice in a fit"
         found.append(Check.of("D14", "warn", words, where=group[0].path, remedy=remedy))
     sampled = [one for one in opened if one.log.origin != "planned" and one.log.n_samples > 1]
-    for group in _groups(sampled, lambda one: _digest(one.log)):
+    for group in _groups(
+        sampled, lambda one: sha256(one.log.q.tobytes() + one.log.tau.tobytes()).digest()
+    ):
         roles = sorted({one.log.role for one in group})
         if len(roles) > 1:
             words = f"leak: {_listed(group)} hold the same samples with roles {' and '.join(roles)}"
@@ -116,14 +118,10 @@ def check_together(opened: Sequence[Opened], subjects: Sequence[Subject]) -> tup
 
 def _groups(opened: Iterable[Opened], key: Callable[[Opened], object]) -> list[list[Opened]]:
     """Return the groups of several logs with one `key`."""
-    groups: dict[object, list[Opened]] = defaultdict(list)
+    groups = defaultdict[object, list[Opened]](list)
     for one in opened:
         groups[key(one)].append(one)
     return [group for group in groups.values() if len(group) > 1]
-
-
-def _digest(log: ExperimentLog) -> bytes:
-    return hashlib.sha256(log.q.tobytes() + log.tau.tobytes()).digest()
 
 
 def _listed(group: Iterable[Opened]) -> str:

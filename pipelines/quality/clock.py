@@ -14,7 +14,7 @@ from pipelines.quality.subject import Subject, many
 
 def length(s: Subject) -> list[Check]:
     """T08, T07: there are samples, and a periodic log holds a whole period."""
-    log, n, periods = s.log, s.log.n_samples, ""
+    log, n = s.log, s.log.n_samples
     if n < FEWEST:
         words = f"{many(n, 'sample')}, fewer than the {FEWEST} that any check needs"
         return [s.say("T08", "reject", words, "record a longer log", signal="t")]
@@ -22,12 +22,11 @@ def length(s: Subject) -> list[Check]:
     if n < SHORTEST:
         words = f"{n} samples, {span:.3g} s: too short for any fit, which needs {SHORTEST} samples"
         return [s.say("T08", "warn", words, "record some seconds of the motion", signal="t")]
-    if log.period is not None:
-        periods = f", periods: {span / log.period:.3g}"
-        if limits.shorter_than_period(s.good.log.t, log.sample_time, log.period):
-            remedy = "record at least one whole period, or correct the attribute period"
-            words = f"{span:.4g} s < {log.period:.4g} s period"
-            return [s.say("T07", "reject", words, remedy, signal="t")]
+    if log.period and limits.shorter_than_period(s.good.log.t, log.sample_time, log.period):
+        remedy = "record at least one whole period, or correct the attribute period"
+        words = f"{span:.4g} s < {log.period:.4g} s period"
+        return [s.say("T07", "reject", words, remedy, signal="t")]
+    periods = f", periods: {span / log.period:.3g}" if log.period else ""
     return s.ok("T07", f"{n} samples in {span:.4g} s{periods}", signal="t")
 
 
@@ -78,36 +77,27 @@ def repeated_stamps(s: Subject) -> list[Check]:
         words = f"{many(at.size, 'sample')} twice, stamp and all; dropped"
         remedy = "find out why the recorder wrote them twice"
         return [s.say("T02", "repair", words, remedy, signal="t", sample=int(at[0]) + 1)]
-    if stale := _stale(s):
-        remedy = "record at the controller's rate, or leave out the repeated samples on import"
-        return [s.say("T02", "warn", stale, remedy, signal="t")]
-    return s.ok("T02", "no stamp is repeated", signal="t")
-
-
-def _stale(s: Subject) -> str:
-    """Return how many whole rows are repeated under a new stamp, in words; "" for none.
-
-    Channels repeat values each at its own time, but for a row that is stale: where the channel that
-    changes most often repeats, all others do, and where it changes they do not.
-    """
+    # A row is stale where the channel that changes most often repeats and all others do, and where
+    # it changes they do not; channels that repeat values each at its own time are no such rows.
     rows = np.hstack([s.log.q, s.log.tau])
     same = rows[1:] == rows[:-1]
-    moves = np.ones(len(same), dtype=bool)
-    for first, last in long_blocks(same.all(axis=1)):  # an arm at rest
-        moves[first:last] = False
-    same = same[moves]
+    rest = np.zeros(len(same), dtype=bool)
+    for first, last in long_blocks(same.all(axis=1)):
+        rest[first:last] = True
+    same = same[~rest]
     finest = int(np.argmin(same.sum(axis=0)))
     old, others = same[:, finest], np.delete(same, finest, axis=1).all(axis=1)
-    if len(same) < FEWEST or not CONFIG.stale_share <= old.mean() < 1.0:
-        return ""
-    if min(others[old].mean(), 1.0 - others[~old].mean()) < CONFIG.stale_together:
-        return ""
-    share = float(old.mean())
-    steps = np.diff(np.flatnonzero(~old))
-    even = np.mean(steps == 2) >= 1.0 - CONFIG.stale_share  # noqa: PLR2004
-    words = f"{percent(share, 2)} of the samples repeat the one before under a new stamp"
-    words = "every second sample repeats the one before" if even else words
-    return f"{words}: {(1.0 - share) / s.log.sample_time:.3g} Hz"
+    share = float(old.mean()) if len(same) >= FEWEST else 0.0
+    if CONFIG.stale_share <= share < 1.0 and (
+        min(others[old].mean(), 1.0 - others[~old].mean()) >= CONFIG.stale_together
+    ):
+        words = f"{percent(share, 2)} of the samples repeat the one before under a new stamp"
+        if np.mean(np.diff(np.flatnonzero(~old)) == 1 + 1) >= 1.0 - CONFIG.stale_share:
+            words = "every second sample repeats the one before"
+        words += f": {(1.0 - share) / s.log.sample_time:.3g} Hz"
+        remedy = "record at the controller's rate, or leave out the repeated samples on import"
+        return [s.say("T02", "warn", words, remedy, signal="t")]
+    return s.ok("T02", "no stamp is repeated", signal="t")
 
 
 def lost_samples(s: Subject) -> list[Check]:

@@ -62,12 +62,12 @@ def limits(s: Subject) -> Sequence[Check | NotTested]:
             words = f"the position goes {over:.3g} {s.unit('q', j)} beyond its limits {[low, high]}"
             remedy = "correct the limits, or the joint's zero"
             found.append(s.say("D12", "warn", words, remedy, signal="q", joint=j))
-        for name, value, limit, unit in (
-            ("speed", speed[j], velocity, s.unit("dq", j)),
-            ("acceleration", acceleration[j], greatest, s.unit("ddq_ref", j)),
+        for name, signal, value, limit in (
+            ("speed", "dq", speed[j], velocity),
+            ("acceleration", "ddq_ref", acceleration[j], greatest),
         ):
             if value > CONFIG.limit_slack * limit:
-                words = f"the {name} reaches {value:.4g} {unit}, "
+                words = f"the {name} reaches {value:.4g} {s.unit(signal, j)}, "
                 words += f"{value / limit:.3g} times its limit"
                 remedy, gate = (
                     "move slower, or correct the limit",

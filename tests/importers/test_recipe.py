@@ -142,6 +142,7 @@ def test_integers_without_end(digits: int) -> None:
 
 @pytest.mark.parametrize(("more", "words"), [
     ("[[file]]\nskip = true\n", r"RRID-C02 .*'file\[1\].match' is missing"),
+    ("[[file]]\nmatch = []\n", r"RRID-C02 .*'file\[1\].match' is empty"),
     ("[log]\nskip = true\n", r"RRID-C01 .*'log.skip' is not a key"),
 ])
 def test_what_would_have_no_effect_is_refused(more: str, words: str) -> None:
