@@ -28,6 +28,7 @@ from pipelines.importers.raw import RawTable, flatten, table_of
 from pipelines.importers.recipe import TextFormat
 from pipelines.importers.text import read_text
 from pipelines.io.limits import FEWEST
+from pipelines.io.log import Array
 from pipelines.io.output import fault_of
 from pipelines.io.sandbox import Answer, guarded, regular_file
 
@@ -120,23 +121,23 @@ def _of_frames(frames: list[dict[str, Any]], source: str) -> dict[str, Any]:
         if isinstance(words, list) and words and all(isinstance(x, str) for x in words):
             found[name] = " ".join(words)  # the joints' names, in every frame
             continue
-        numbers = {k: x for k, value in of_name.items() if (x := _numbers(value)) is not None}
-        shape = Counter(np.shape(x) for x in numbers.values()).most_common(1)
-        block = np.full((len(frames), *(shape[0][0] if shape else ())), np.nan)
-        for k, x in numbers.items():
-            if np.shape(x) == block.shape[1:]:
-                block[k] = x
+        block = _numbers([of_name.get(k) for k in range(len(frames))])
+        if block is None:
+            numbers = {k: x for k, value in of_name.items() if (x := _numbers(value)) is not None}
+            shape = Counter(x.shape for x in numbers.values()).most_common(1)
+            block = np.full((len(frames), *(shape[0][0] if shape else ())), np.nan)
+            for k, x in numbers.items():
+                if x.shape == block.shape[1:]:
+                    block[k] = x
         for index in np.ndindex(block.shape[1:]):
             found[name + "".join(f"[{i}]" for i in index)] = block[:, *index]
     return found
 
 
-def _numbers(value: Any) -> Any:
-    """Return a number, or an array of a list of numbers or lists; None of anything else."""
-    if isinstance(value, float | int):
-        return value
+def _numbers(value: Any) -> Array | None:
+    """Return an array of a number, or of a list of numbers or lists; None of anything else."""
     try:
-        return np.array(value, np.float64) if isinstance(value, list) else None
+        return np.array(value, np.float64)
     except (ValueError, TypeError):
         return None
 

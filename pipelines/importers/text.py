@@ -414,15 +414,16 @@ def _clock_times(words: Any) -> Array | None:
         return None
     with contextlib.suppress(ValueError, OverflowError):
         return _over_midnight(pd.to_timedelta(point).dt.total_seconds().to_numpy(), point)
-    read = list[Array]()
-    for first in (False, True):
-        for form in ("ISO8601", None, "mixed"):
+    for form in ("ISO8601", None, "mixed"):  # None: that of the first cell
+        read = list[Array]()
+        for first in (False,) if form == "ISO8601" else (False, True):
             with warnings.catch_warnings(), contextlib.suppress(ValueError, OverflowError):
                 warnings.simplefilter("ignore")  # of an order of day and month that is not asked
                 dates = pd.to_datetime(point, format=form, dayfirst=first, utc=True)
                 read.append((dates - dates.iloc[0]).dt.total_seconds().to_numpy(np.float64))
-                break
-    return _over_midnight(min(read, key=np.ptp), point) if read else None
+        if read:
+            return _over_midnight(min(read, key=np.ptp), point)
+    return None
 
 
 def _over_midnight(seconds: Array, words: Any) -> Array:
