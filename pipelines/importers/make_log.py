@@ -20,7 +20,7 @@ from pipelines.importers.config import REPAIR
 from pipelines.importers.patterns import fill
 from pipelines.importers.raw import RawTable, expand
 from pipelines.importers.recipe import ControllerSpec, LogSpec, Recipe, ResampleSpec
-from pipelines.importers.repair import Limits, Recording, late_intervals, repair
+from pipelines.importers.repair import Limits, Recording, repair
 from pipelines.importers.units import Converted, joint_side, si_of, units_of
 from pipelines.io import schema
 from pipelines.io.limits import FEWEST, recorded_span, shorter_than_period
@@ -36,7 +36,6 @@ from pipelines.io.log import (
 from pipelines.io.results import NOT_STORED
 from pipelines.io.robot import format_robot
 from pipelines.quality.checks import check_log
-from pipelines.quality.subject import many
 from pipelines.quality.units import DEGREES_OR_MOTOR, TRUSTED
 
 Method = Literal["spline", "linear"]
@@ -50,6 +49,7 @@ _IN_RECIPE = {
     "RRID-S05": 'declare the unit of tau that its numbers are in, such as unit = "N mm", or '
     "correct the torque limits of the robot",
     "RRID-S07": DEGREES_OR_MOTOR,
+    "RRID-T05": "add [resample] rate = … for an even grid",
 }
 
 
@@ -272,8 +272,6 @@ def _on_one_clock(
         ms = 1e3 * np.diff(part.t)
         words = f"resampled from {part.t.size} samples {ms.min():.4g} to {ms.max():.4g} ms apart "
         words += f"(median {np.median(ms):.4g} ms) to {at.size} at {spec.rate:g} Hz, {method}"
-        if late := late_intervals(part).size:
-            words += f"; {many(late, 'interval')} of more than 1.5 times the median bridged"
         remedy = "none needed for fits; record with an even clock where frequencies near the rate"
         checks.append(part.check("T05", words, f"{remedy} matter", "warn"))
         done.altered.append(words)
@@ -399,10 +397,10 @@ def _derived(
 
 
 def _examine(log: ExperimentLog, recording: str, trust_units: bool) -> list[Check]:
-    """Return the warnings of `inspect` about a new log, so that it passes there.
+    """Return the warnings of `inspect` about the samples of a new log, so that it passes there.
 
-    They are glitches (D06), which stay for the user of the log to decide; the import has said the
-    others.
+    They are lost samples (T03), uneven time (T05), and glitches (D06), which stay for the user of
+    the log to decide.
 
     Raises:
         InputRejected: S20 unlike the format, and what `inspect` would reject or repair before
@@ -418,4 +416,6 @@ def _examine(log: ExperimentLog, recording: str, trust_units: bool) -> list[Chec
         elif check.level in ("reject", "repair"):
             remedy = _IN_RECIPE.get(check.code, check.remedy)
             raise replace(check, remedy=remedy).as_error()
+        elif check.level == "warn" and check.code in ("RRID-T03", "RRID-T05"):
+            found.append(replace(check, remedy=_IN_RECIPE.get(check.code, check.remedy)))
     return found

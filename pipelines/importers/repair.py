@@ -15,7 +15,7 @@ import numpy.typing as npt
 from pipelines.errors import Check, Gathering, InputRejected, Level
 from pipelines.importers.config import REPAIR
 from pipelines.io import limits as common
-from pipelines.io.limits import FEWEST, percent
+from pipelines.io.limits import FEWEST
 from pipelines.io.log import Array
 from pipelines.quality.subject import many
 
@@ -88,16 +88,7 @@ def repair(recording: Recording, limits: Limits) -> tuple[tuple[Recording, ...],
     recording = _drop_duplicates(recording, checks)
     steady = _split_at_steps(recording, checks)
     parts = tuple(piece for part in steady for piece in _split_at_gaps(part, limits, checks))
-    if not limits.resampled:  # of a resampled log, it is in its record
-        for part in parts:
-            _say_uneven(part, checks)
     return parts, tuple(checks)
-
-
-def late_intervals(part: Recording) -> Index:
-    """Return the samples after which a few are lost, or come late."""
-    ticks = np.diff(part.t) / float(np.median(np.diff(part.t)))
-    return common.late(ticks, common.jitter(ticks)[0])
 
 
 def _mark_missing(
@@ -223,21 +214,3 @@ def _split_at_gaps(part: Recording, limits: Limits, checks: list[Check]) -> tupl
         raise part.refused("T04", f"{words}: {most}", "record again without interruption")
     checks.append(part.check("T04", f"{words}: {into}", "look why the recorder stopped there"))
     return kept
-
-
-def _say_uneven(part: Recording, checks: list[Check]) -> None:
-    """T03, T05: report lost samples and uneven time, which stay."""
-    steps = np.diff(part.t)
-    median = float(np.median(steps))
-    gaps = late_intervals(part)
-    if lost := int(np.round(steps[gaps] / median - 1.0).sum()):
-        share = f"{100.0 * lost / (lost + part.t.size):.2g} %"
-        where = f"{many(gaps.size, 'gap')} of at most {common.GAP_LIMIT}"
-        message = f"{many(lost, 'sample')} ({share}) lost in {where}, after {part.listed(gaps)}"
-        remedy = "give the recorder more priority, or record fewer signals"
-        checks.append(part.check("T03", message, remedy, "warn"))
-    rms, worst = common.jitter(steps / median)
-    if rms > common.LARGEST_JITTER:
-        message = f"time is uneven: steps vary about {median:.6g} s by {percent(rms)} (rms), at "
-        remedy = "add [resample] rate = … for an even grid"
-        checks.append(part.check("T05", f"{message}most by {percent(worst)}", remedy, "warn"))

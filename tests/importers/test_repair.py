@@ -32,7 +32,7 @@ def levels(checks: tuple[Check, ...]) -> dict[str, str]:
 def test_d01_an_isolated_nan_leaves_a_gap_in_time() -> None:
     """D01: two holes are left out, nothing is put in their place."""
     (part,), checks = repair(changed("q", [100, 700], 1, np.nan), Limits())
-    assert levels(checks) == {"D01": "repair", "T03": "warn"}
+    assert levels(checks) == {"D01": "repair"}
     assert "lines 102, 702" in checks[0].message
     assert part.t.size == 1198
     assert np.isclose(np.diff(part.t).max(), 0.002)
