@@ -23,7 +23,7 @@ from pipelines.importers.recipe import ControllerSpec, LogSpec, Recipe, Resample
 from pipelines.importers.repair import Limits, Recording, repair
 from pipelines.importers.units import Converted, joint_side, si_of, units_of
 from pipelines.io import schema
-from pipelines.io.limits import FEWEST, recorded_span, shorter_than_period
+from pipelines.io.limits import recorded_span, shorter_than_period
 from pipelines.io.log import (
     Array,
     Controller,
@@ -286,8 +286,7 @@ def _log(
         number: of a log that had to be split.
 
     Raises:
-        InputRejected: T07 shorter than a period, T08 hardly a sample, S01 an frf log without
-            excitation.
+        InputRejected: S01, an frf log without excitation.
         UsageError: C02, name, experiment, role or joint cannot be read from the recipe and the
             file's name.
     """
@@ -303,16 +302,11 @@ def _log(
         step = 1.0 / recipe.resample.rate
     elif recipe.time.column is not None:
         step = float(np.median(np.diff(t)))
-    if t.size < FEWEST:
-        message = f"{t.size} samples at {1 / step:g} Hz; a log needs {FEWEST}"
-        raise InputRejected("T08", message, where, "record longer, or resample faster")
-    if about.period is not None and shorter_than_period(t, step, about.period):
-        short = f"{recorded_span(t, step):.4g} s < {about.period:g} s period"
-        if number is None:
-            raise InputRejected("T07", short, where, "record a whole period, or correct period")
+    if number and about.period is not None and shorter_than_period(t, step, about.period):
         # A part of a log that had to be split need not hold a period; it is a log without one.
-        about = replace(about, period=None)
+        short = f"{recorded_span(t, step):.4g} s < {about.period:g} s period"
         done.altered.append(f"period left out: {short}")
+        about = replace(about, period=None)
     if about.experiment == "frf" and "v" not in signals:
         raise InputRejected("S01", "an frf log without its excitation v", where, "map signals.v")
     name = f"{name}-{number}" if number else name
