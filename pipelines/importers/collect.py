@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -66,19 +66,13 @@ def collect(
     drive = drive_of(recipe.drive, arm, path)
     names = patterns.files_below(folder)
     cases = [*recipe.file, *([FileSpec(match=recipe.log.match)] if recipe.log.match else [])]
-    fits = patterns.matches([case.match for case in cases], names, path)
-    hits: dict[str, tuple[FileSpec, Mapping[str, str], dict[str, str]]] = {}
-    for name in names:
-        first = next((k for k, fit in enumerate(fits) if name in fit), None)
-        if first is not None and not cases[first].skip:
-            groups = fits[first][name]
-            hits[name] = cases[first], groups, _files_of(recipe, groups, name)
+    hits = _hits(recipe, cases, names, path)
     companions = {
         file for name, (*_, files) in hits.items() for file in files.values() if file != name
     }
     read: dict[str, RawTable] = {}
     sources, problems = list[Source](), Gathering()
-    for name, (case, found, files) in hits.items():
+    for name, (case, groups, files) in hits.items():
         if name in companions:
             continue
         with problems.part():
@@ -93,7 +87,7 @@ def collect(
                     inside = patterns.inside(folder, file, path)
                     read[file] = read_table(inside, recipe.format, file)
             tables = {file: read[file] for file in dict.fromkeys([name, *files.values()])}
-            sources.append(Source(case, found, name, tables, files))
+            sources.append(Source(case, groups, name, tables, files))
     problems.raise_all()
     recorded = [name for name in names if Path(name).suffix.lower() in RECORDINGS]
     if not sources:
@@ -113,6 +107,20 @@ def collect(
         (path, *described, *(folder / name for name in read)),
         hashes={folder / name: table.sha256 for name, table in read.items()},
     )
+
+
+def _hits(
+    recipe: Recipe, cases: Sequence[FileSpec], names: Sequence[str], path: Path
+) -> Mapping[str, tuple[FileSpec, Mapping[str, str], dict[str, str]]]:
+    """Return the files that are recordings: the first case of each, its groups and its files."""
+    fits = patterns.matches([case.match for case in cases], names, path)
+    hits = dict[str, tuple[FileSpec, Mapping[str, str], dict[str, str]]]()
+    for name in names:
+        first = next((k for k, fit in enumerate(fits) if name in fit), None)
+        if first is not None and not cases[first].skip:
+            groups = fits[first][name]
+            hits[name] = cases[first], groups, _files_of(recipe, groups, name)
+    return hits
 
 
 def _files_of(recipe: Recipe, groups: Mapping[str, str], primary: str) -> dict[str, str]:

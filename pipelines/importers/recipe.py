@@ -52,7 +52,7 @@ _STRICT = {"extra": "forbid"}
 
 @dataclass(frozen=True)
 class AboutSpec:
-    """What `[log]` says of every log, and `[[file]]` of the files of a pattern."""
+    """The keys that `[log]` has for every log, and `[[file]]` for the files of a pattern."""
 
     name: str | None = None  # may hold {groups} of the pattern, and {stem}
     experiment: Experiment | None = None  # a group {experiment}, {role} or {joint} comes first
