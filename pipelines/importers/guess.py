@@ -380,6 +380,8 @@ def _unexplained(signal: str, roles: Roles) -> str:
     A word that position and torque both have is a name of the robot, or of the recorder.
     """
     group, other = (roles.chosen.get(s) for s in ("q", "tau")[:: 1 if signal == "q" else -1])
+    if group and group.order == "words":
+        return "in which order are these joints, from the base to the tip?"
     known = set(other.name.unknown if other else ())
     words = {word for word in (group.name.unknown if group else ()) if word[1:]} - known
     return f"what does '{clean(min(words), 40)}' say of it?" if words else ""

@@ -40,7 +40,7 @@ class Group:
     columns: tuple[str, ...]
     name: ColumnName
     units: tuple[str, ...]  # one a column, "" where neither header nor name says it
-    order: str  # what it rests on: "the robot's names", "numbers", "the file"
+    order: str  # what it rests on: "the robot's names", "numbers", "words", "the file"
 
     @property
     def unit(self) -> str:
@@ -125,15 +125,21 @@ def _rank(signal: str, name: ColumnName) -> tuple[int, int] | None:
 def _groups(table: RawTable, joints: Sequence[str]) -> list[Group]:
     """Return columns of one quantity and equal words together, in the order of the joints."""
     labels = [[word for word in words_of(name) if word not in NOISE] for name in joints]
-    alike = defaultdict[object, list[tuple[str, ColumnName, int]]](list)
+    alike = defaultdict[tuple[object, ...], list[tuple[str, ColumnName, int]]](list)
     for column in table.columns:
         joint, rest = _joint_in(column, labels)
         name = read_name(rest, table.units.get(column, ""))
-        kind = (name.quantity, name.origin, name.motor, name.partial, name.role, name.unknown)
-        alike[*kind, joint < 0].append((column, name, joint))
+        kind = (name.quantity, name.origin, name.motor, name.partial, name.role)
+        alike[*kind, joint < 0, name.unknown].append((column, name, joint))
+    for key, members in [*alike.items()]:
+        column, name, joint = members[0]
+        if len(members) == 1 and joint < 0 and name.unknown and not name.numbers:
+            # named after a joint that no robot explains, "waist": its words give no order
+            alike[*key[:-1], "words"].append((column, name, joint))
+            del alike[key]
     listed, groups = _listed_order(table, joints), []
-    for members in alike.values():
-        order = "the file"
+    for key, members in alike.items():
+        order = "words" if key[-1] == "words" and len(members) > 1 else "the file"
         numbers = zip(*(name.numbers for _, name, _ in members), strict=False)
         varying = [k for k, x in enumerate(numbers) if len(set(x)) == len(members) > 1]
         if members[0][2] >= 0:
@@ -145,7 +151,8 @@ def _groups(table: RawTable, joints: Sequence[str]) -> list[Group]:
             members = sorted(members, key=lambda member: member[1].numbers[varying[0]])
             order = "numbers"
         columns, names, _ = zip(*members, strict=True)
-        groups.append(Group(columns, names[0], tuple(name.unit for name in names), order))
+        name = replace(names[0], unknown=()) if order == "words" else names[0]
+        groups.append(Group(columns, name, tuple(each.unit for each in names), order))
     return groups
 
 

@@ -87,6 +87,9 @@ def read_json(data: bytes, source: str) -> Any:
 
 def _series(document: Any, source: str) -> Any:
     """Return arrays by name of a document that pandas wrote, or of the longest list of frames."""
+    if isinstance(document, dict) and document.keys() >= {"columns", "data"}:
+        rows = zip(*document["data"], strict=True)
+        return {k: list(x) for k, x in zip(document["columns"], rows, strict=True)}
     columns = document.values() if isinstance(document, dict) else [None]
     if all(isinstance(x, dict) and all(map(str.isdecimal, x)) for x in columns):
         return {name: list(column.values()) for name, column in document.items()}

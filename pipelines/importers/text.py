@@ -126,20 +126,7 @@ def _as_utf8(data: bytes, source: str, encoding: str | None) -> tuple[bytes, lis
     """
     checks: list[Check] = []
     if encoding is None:
-        encoding, head = "utf-8", data[: TEXT.head_bytes]
-        if data.startswith(codecs.BOM_UTF8):
-            encoding = "utf-8-sig"
-        elif data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-            encoding = "utf-16"
-        elif head[1::2].count(0) > TEXT.nul_share * len(head) and not head[::2].count(0):
-            encoding = "utf-16-le"
-        elif head[::2].count(0) > TEXT.nul_share * len(head) and not head[1::2].count(0):
-            encoding = "utf-16-be"
-        else:
-            try:
-                data.decode()
-            except UnicodeDecodeError:
-                encoding = "latin-1"
+        encoding = _encoding_of(data, source)
         if encoding != "utf-8":
             remedy = "give encoding under [format] if that is wrong"
             checks.append(Check.of("F16", "warn", f"read as {encoding}", source, remedy))
@@ -162,6 +149,27 @@ def _as_utf8(data: bytes, source: str, encoding: str | None) -> tuple[bytes, lis
         message, remedy = f"not text in {encoding}: {problem}", "give its encoding under [format]"
         raise InputRejected("F16", message, source, remedy) from None
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n"), checks
+
+
+def _encoding_of(data: bytes, source: str) -> str:
+    head, letters = data[: TEXT.head_bytes], rb"[\x80-\xff]"
+    if data.startswith(codecs.BOM_UTF8):
+        return "utf-8-sig"
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    for high, low, encoding in ((1, 0, "utf-16-le"), (0, 1, "utf-16-be")):
+        nul = head[high::2].count(0)
+        if nul > TEXT.nul_share * len(head) and not head[low::2].count(0):
+            return encoding
+    try:
+        data.decode()
+    except UnicodeDecodeError:  # accents come alone, letters of other alphabets together
+        together = b"".join(re.findall(letters + b"{2,}", head))
+        if 2 * len(together) <= len(re.findall(letters, head)):
+            return "latin-1"
+        message, remedy = "text in an unknown encoding", "save it as UTF-8, or give its encoding"
+        raise InputRejected("F16", message, source, f"{remedy} under [format]") from None
+    return "utf-8"
 
 
 def _dialect(every: list[bytes], plain: list[int], source: str, given: TextFormat) -> Dialect:
