@@ -146,11 +146,19 @@ class Answer(Generic[R]):
         Raises:
             UsageError: C02, there is no such figure.
         """
+        from io import BytesIO
+
         from matplotlib.figure import Figure
+
+        class Drawing(Figure):
+            def _repr_png_(self) -> bytes:  # what a notebook shows
+                picture = BytesIO()
+                self.savefig(picture, format="png")
+                return picture.getvalue()
 
         for one in self._drawings():
             if name in ("", one.name):
-                drawing = Figure(figsize=one.size, layout="constrained")
+                drawing = Drawing(figsize=one.size, layout="constrained")
                 one.draw(drawing)
                 return drawing
         there = ", ".join(self.figures) or "none"

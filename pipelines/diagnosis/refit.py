@@ -161,15 +161,18 @@ class Later:
         It leads to `here` where no damping leads lower.
 
         Args:
-            linear: move the numbers of the nominal model alone.
+            linear: move the numbers of the nominal model and amplitudes alone.
         """
-        slopes, names = self.slopes(replace(here.model, effects=()) if linear else here.model, rows)
+        slopes, names = self.slopes(here.model, rows)
+        if linear:
+            kept = [k for k, (_, _, name) in enumerate(names) if name.isdigit()]
+            slopes, names = slopes.take(np.array(kept, dtype=np.intp)), [names[k] for k in kept]
         size = slopes.lengths
         unit = slopes.scaled(1.0 / size)
         gradient = np.r_[known.slope(here.theta, here.residual), unit.moments(here.residual)]
         first = _DAMPING.index(damping)
         for place in range(first, len(_DAMPING)) if names else (0,):
-            step = known.beside(unit, _DAMPING[place]).solve(gradient)
+            step = self._step(here.model, known, unit, names, gradient, _DAMPING[place])
             way, more = step[: len(here.theta)], step[len(here.theta) :] / size
             own = way[: self.prior.n_nominal] / self.prior.scale
             there = self._at(here.model.moved(np.r_[own, more], names), here.theta + way, known)
@@ -178,6 +181,28 @@ class Later:
             if not place and gradient @ step < 2.0 + _SETTLED * here.cost:  # if linear
                 break
         return here, _DAMPING[0]
+
+    def _step(
+        self,
+        model: Exact,
+        known: Belief,
+        unit: Table,
+        names: Sequence[tuple[int, int, str]],
+        gradient: Array,
+        damping: float,
+    ) -> Array:
+        """Return the damped step of all numbers; those at the end of their range stay inside."""
+        first = len(gradient) - len(names)
+        moving, step = np.arange(len(gradient)), np.zeros(len(gradient))
+        while True:
+            columns = unit.take(moving[first:] - first)
+            step[:] = 0.0
+            step[moving] = known.beside(columns, damping).solve(gradient[moving])
+            ways = zip(names, step[first:].tolist(), strict=True)
+            leaving = [first + k for k, (name, by) in enumerate(ways) if _leaves(model, name, by)]
+            if not leaving:
+                return step
+            moving = np.setdiff1d(moving, leaving)
 
     def composed(self, model: Exact) -> Later:
         """Return the same with the columns of drives and records beside the effects of a model.
@@ -542,6 +567,15 @@ class Later:
             y - t - s
             for y, t, s in zip(self.rows.y, torque, self.base.times(standing), strict=True)
         )
+
+
+def _leaves(model: Exact, name: tuple[int, int, str], by: float) -> bool:
+    """Return whether a number is at the end of its range, and `by` points out of it."""
+    of_effect, place, number = name
+    if number.isdigit():
+        return False
+    owner = model.effects[place].effect if of_effect else model.columns.laws[place]
+    return owner.at_end(number, by)
 
 
 def _passes_on(shapes: Sequence[Effect], acting: Collection[int]) -> bool:

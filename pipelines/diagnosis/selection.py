@@ -7,7 +7,7 @@ selection.rounds              the last of them says why the search ended
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
@@ -184,7 +184,7 @@ class _Step:
         later = self.later
         rows, arm = later.rows, later.dataset.arm
         touch, moment = push_of(rows, later.dictionary, arm, self.state.residual, later.config)
-        every = [one for one in self._refitted(responses, touch) if self._relevant(one)]
+        every = self._refitted(responses, touch)
         noisy = [one for one in every if one.noisy]
         most = max((one.gain for one in noisy), default=0.0)
         tried = [one for one in every if not (one.noisy or (one.event and one.gain < most))]
@@ -215,8 +215,7 @@ class _Step:
         """
         first = min(tried, key=lambda one: float(one.scores(self.later).sum()))
         step = self._after(first)
-        seconds = (one for one in step._refitted((), None) if step._relevant(one))
-        complete = any(not step._after(one)._unnamed(False) for one in seconds)
+        complete = any(not step._after(one)._unnamed(False) for one in step._refitted((), None))
         return first if complete else None
 
     def _after(self, one: Candidate) -> _Step:
@@ -307,7 +306,7 @@ class _Step:
         counted = np.where(saved > 0.0, np.maximum(saved - self._inexact, 0.0), saved)
         return float(counted.sum()) > self._threshold(self.significant[one.key])
 
-    def _promising(self) -> list[Screened]:
+    def _promising(self, without: Collection[Key]) -> list[Screened]:
         """Return the significant causes that are the most promising ones, the best first.
 
         A cause is promising by its gain, or by its gain and what the standing numbers have taken of
@@ -315,7 +314,8 @@ class _Step:
         and the best of the waves that matter only when they are fitted comes last.
         """
         config = self.later.config
-        named = {key: one for key, one in self.significant.items() if one.group.kind == "named"}
+        every = {k: one for k, one in self.significant.items() if k not in without}
+        named = {key: one for key, one in every.items() if one.group.kind == "named"}
         gain = {key: one.gain for key, one in named.items() if self._matters(one)}
         fine = sorted((k for k in named if k not in gain), key=lambda key: -named[key].gain)[:1]
         order: list[Key] = []
@@ -329,19 +329,26 @@ class _Step:
         return [named[key] for key in (*order[: config.refits], *fine)]
 
     def _refitted(self, responses: Sequence[Acting], touch: Window | None) -> list[Candidate]:
-        """Return causes with all their numbers fitted exactly, and the best window of an event."""
-        later, named = self.later, self._promising()
-        top = max([1.0, *(one.gain for one in named)])
+        """Return relevant causes with all their numbers fitted exactly, and the best event.
+
+        Where none of the most promising causes is possible and relevant, the next ones are tried.
+        """
+        later, named = self.later, self._promising(())
+        top, seen = max([1.0, *(one.gain for one in named)]), set[Key]()
         asked: list[tuple[Effect, Array, float, int | None]] = []
         if touch is not None:
             asked.append((touch.effect, touch.amplitudes, touch.gain, touch.log))
-        for one in named:
-            asked.append((later.form(one.group), one.amplitudes, one.gain, None))
         for acting in responses:
             effect = acting.effect.at(acting.values)
             asked.append((effect, effect.amplitudes(acting.values), top, None))
-        tried = (_candidate(later, self.state, *one) for one in asked)
-        return [one for one in tried if one is not None and one.possible]
+        found = list[Candidate]()
+        while named or asked:
+            asked += [(later.form(one.group), one.amplitudes, one.gain, None) for one in named]
+            tried = (_candidate(later, self.state, *one) for one in asked)
+            found += [one for one in tried if one and one.possible and self._relevant(one)]
+            seen |= {one.group.key for one in named}
+            asked, named = [], [] if found else self._promising(seen)
+        return found
 
     def _unnamed(self, compliant: bool) -> dict[Key, State]:
         """Return the best shape without a name, and, where asked, the best compliance."""

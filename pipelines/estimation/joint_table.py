@@ -32,7 +32,7 @@ __all__ = [
     "in_rows",
 ]
 
-_ROUNDING = 1e-13  # numerics: of each number's information: more than sums of 1e5 rows round off
+_ROUNDING = 1e-11  # numerics: of a diagonal, by which products of columns may be wrong
 _ROOM, _AT_ONCE = 4_000_000, 64  # numerics: values in double precision, columns
 _DEPENDENT = 1e-6  # numerics: squared length, of columns of unit length, that others leave
 

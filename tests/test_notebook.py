@@ -1,0 +1,24 @@
+"""The notebook in docs: its cells run, and find in the sample logs what was hidden there."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def test_the_notebook_runs_and_finds_the_hidden_cause(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "sample_logs").symlink_to(ROOT / "sample_logs")
+    monkeypatch.chdir(tmp_path)
+    cells: dict[str, Any] = {}
+    for cell in json.loads((ROOT / "docs" / "rrr-changed.ipynb").read_text())["cells"]:
+        if cell["cell_type"] == "code":
+            exec("".join(cell["source"]), cells)  # noqa: S102
+    first = cells["found"].result.findings[0]
+    assert (first.cause, first.joint) == ("cogging", 2)
+    assert cells["found"].plot()._repr_png_().startswith(b"\x89PNG")
+    assert (cells["folder"] / "model.json").is_file()
