@@ -121,7 +121,7 @@ FAULTS = (
     Fault("D07 lost", lambda g: shifted(healthy_without_reference(g), 0.3),
           "warn", "loses counts|no turn", "joint 2, sample 2501", True),
     Fault("D08", lambda g: with_signal(g, q=0.001 * np.rint(g.q / 0.001)), "warn", "R = δ²/12 = 8.33e-08", "signal q, joint 1"),
-    Fault("D09", lambda g: make_log(one_joint(good_path(), 2)), "warn", "p1, p6 and p7", gate=True, also=("RRID-D04",)),
+    Fault("D09", lambda g: make_log(one_joint(good_path(), 2)), "warn", "no sample shows p1, p2, p5, p6, p7", gate=True, also=("RRID-D04",)),
     Fault("D10", lambda g: make_log(turning(6.0, 1)),
           "warn", "joint 2 never changes sign", "joint 2", True, also=("RRID-D05", "RRID-D09")),
     Fault("D11 power", stopped, "warn", "torques drop to zero", "sample 4000"),
