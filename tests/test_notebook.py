@@ -17,7 +17,7 @@ def test_the_notebook_runs_and_finds_the_hidden_cause(monkeypatch: pytest.Monkey
     cells: dict[str, Any] = {}
     for cell in json.loads((ROOT / "docs" / "rrr-changed.ipynb").read_text())["cells"]:
         if cell["cell_type"] == "code":
-            exec("".join(cell["source"]), cells)  # noqa: S102
+            exec("".join(cell["source"]), cells)
     first = cells["found"].result.findings[0]
     assert (first.cause, first.joint) == ("cogging", 2)
     assert cells["found"].plot()._repr_png_().startswith(b"\x89PNG")

@@ -30,6 +30,9 @@ from pipelines.estimation.joint_table import Array
 __all__ = ["Cause", "Round", "SearchStart", "Selection", "best_law", "laws_of", "refit", "select"]
 
 
+_TURNS = 2  # numerics: groups of promising causes that are refitted until one is a cause
+
+
 @dataclass(frozen=True)
 class Candidate:
     """A cause that was refitted exactly."""
@@ -342,12 +345,14 @@ class _Step:
             effect = acting.effect.at(acting.values)
             asked.append((effect, effect.amplitudes(acting.values), top, None))
         found = list[Candidate]()
-        while named or asked:
+        for _ in range(_TURNS):
             asked += [(later.form(one.group), one.amplitudes, one.gain, None) for one in named]
             tried = (_candidate(later, self.state, *one) for one in asked)
             found += [one for one in tried if one and one.possible and self._relevant(one)]
             seen |= {one.group.key for one in named}
-            asked, named = [], [] if found else self._promising(seen)
+            if found:
+                break
+            asked, named = [], self._promising(seen)
         return found
 
     def _unnamed(self, compliant: bool) -> dict[Key, State]:
