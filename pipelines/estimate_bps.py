@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pipelines.dynamics.arm import Arm, ArmTorque
+from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.parameter import Uncertainty
 from pipelines.errors import Check, NothingMatched, UsageError
 from pipelines.estimation.balance import power_balance
@@ -33,14 +33,21 @@ from pipelines.estimation.estimate import (
 from pipelines.estimation.identifiability import not_separated
 from pipelines.estimation.judgements import REMEDY, negative_viscous
 from pipelines.estimation.mean_period import averaged, doubts, residuals
-from pipelines.estimation.motion import Motions, Reconstructed, Reconstruction, for_equations
+from pipelines.estimation.motion import Motions, Reconstruction, for_equations
 from pipelines.estimation.nominal import columns_in_words, fitted_arm, nominal_columns
-from pipelines.estimation.regression import Rows
+from pipelines.estimation.regression import Columns
 from pipelines.estimation.rests import moving_rows
-from pipelines.estimation.result import Result, course, parameters, validity
-from pipelines.estimation.result import torques as torque_parts
+from pipelines.estimation.result import (
+    Result,
+    course,
+    of_this_robot,
+    parameters,
+    torques,
+    validity,
+    with_torques,
+)
 from pipelines.io.files import write_log
-from pipelines.io.log import ExperimentLog, derive, digest_of, recording
+from pipelines.io.log import ExperimentLog, digest_of, recording
 from pipelines.io.model_file import (
     Source,
     read_covariance,
@@ -53,7 +60,7 @@ from pipelines.io.results import encode
 from pipelines.io.schema import joint_unit
 from pipelines.report.bps_report import bps_report
 from pipelines.report.report import Report
-from pipelines.stage import Inputs, Request, Stage, Uses, read_logs, slug
+from pipelines.stage import Inputs, Request, Stage, Uses, read_logs
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
@@ -112,90 +119,80 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     """
     refuse_strange(settings)
     identify, validate = _chosen(inputs, settings.allow_overlap)
-    given = _friction_of(inputs.material, identify[0])
-    columns = nominal_columns(
-        identify[0].robot,
-        friction=given is None,
-        offset=settings.offset,
-        rotor_inertia=settings.rotor_inertia,
-        symmetric=settings.symmetric,
-    )
-    recipe = Recipe(
-        settings.reconstruction,
-        settings.cutoff_hz,
-        settings.decimate,
-        settings.min_speed,
-        None if given is None else given.friction_torque,
-    )
-    for log in (*identify, *validate):
-        settings.reconstruction.check(log.n_joints)
+    logs, first = (*identify, *validate), len(identify)
+    given: Arm | None = inputs.material
+    if given is not None and not of_this_robot(given, logs[0]).friction:
+        given = None
+    how = settings.reconstruction
+    for log in logs:
+        how.check(log.n_joints)
         refuse_unfit(settings, log)
-    logs = (*identify, *validate)
     said, boundary = examined(logs, settings.skip_sanity_checks, gates=True)
-    motions = motions_of(identify, settings.reconstruction)
-    judges = motions_of(validate, settings.reconstruction)
-    even = for_equations((*motions, *judges))
-    recipe = with_cutoff(recipe, even[: len(motions)])
+    motions = motions_of(logs, how)
+    even = for_equations(motions)
+    known = None if given is None else given.friction_torque
+    recipe = Recipe(how, settings.cutoff_hz, settings.decimate, settings.min_speed, known)
+    recipe = with_cutoff(recipe, even[:first])
     means, scatter = averaged(even, recipe.cutoff_hz)
-    first = len(motions)
+    columns = _columns(logs[0], settings, friction=given is None, offset=settings.offset)
     rows = moving_rows(means, first, columns, recipe, settings.weighted)
-    fitted = fit_logs(means[:first], columns, recipe, settings.weighted, rows[:first])
-    judged = judge(fitted, means[first:], settings.blocks, rows[first:])
-    arm = fitted_arm(
-        fitted.estimate, identify[0].robot_name, () if given is None else given.friction
-    )
-    said_of_periods = [
-        check
-        for own, log in zip(scatter, logs, strict=True)
-        if own is not None
-        for check in doubts(own[0], log.source or log.name)
-    ]
+
+    def judged_fit(columns: Columns, recipe: Recipe) -> tuple[Fitted, Judged]:
+        fitted = fit_logs(means[:first], columns, recipe, settings.weighted, rows[:first])
+        return fitted, judge(fitted, means[first:], settings.blocks, rows[first:])
+
+    fitted, judged = judged_fit(columns, recipe)
+    rigid = _columns(logs[0], settings, friction=False, offset=False)
+    alone = judged_fit(rigid, replace(recipe, known=None))[1]
+    arm = fitted_arm(fitted.estimate, logs[0].robot_name, given.friction if given else ())
+    for own, log in zip(scatter, logs, strict=True):
+        if own is not None:
+            said = (*said, *doubts(own[0], log.source or log.name))
     return replace(
-        _result(fitted, judged, (*motions, *judges), arm, settings),
+        _result(fitted, judged, motions, arm, settings),
         boundary=boundary,
-        data_quality=(*said, *negative_viscous(fitted.estimate, arm.name), *said_of_periods),
+        data_quality=(*said, *negative_viscous(fitted.estimate, arm.name)),
         noise_floor=residuals(scatter, fitted, judged, logs),
-        rigid_body_alone=_rigid_body_alone(fitted, means, rows, settings),
+        rigid_body_alone=tuple(map(float, alone.errors.rms)),
     )
 
 
-def _rigid_body_alone(
-    fitted: Fitted, means: Motions, rows: list[Rows], settings: Settings
-) -> tuple[float, ...]:
-    """Return the held-out error (joints,) of the rigid body fitted without friction and offset."""
-    identify = len(fitted.motions)
-    columns = nominal_columns(
-        means[0][0].robot,
-        friction=False,
-        offset=False,
-        rotor_inertia=settings.rotor_inertia,
-        symmetric=settings.symmetric,
+def _chosen(inputs: Inputs, allow_overlap: bool) -> tuple[list[ExperimentLog], list[ExperimentLog]]:
+    """Return the logs that are fitted, and those that judge."""
+    logs = [opened.log for opened in inputs.logs if opened.log.origin != "planned"]
+    identify = [log for log in logs if log.role == "identify" and log.experiment in FITTED]
+    if not identify:
+        kinds = ", ".join(sorted({f"{log.experiment} ({log.role})" for log in logs})) or "none"
+        words = f"no excitation or free log of role identify; there are: {kinds}"
+        remedy = "record an excitation, or give the folder that has one"
+        raise NothingMatched("C06", words, inputs.label, remedy)
+    if len({log.robot_text for log in logs}) > 1:
+        remedy = "name the logs of one; 'rrrid run' takes a folder of several apart"
+        raise UsageError("C02", "logs of several robots", inputs.label, remedy)
+    validate = [log for log in logs if log.role == "validate"]
+    if not allow_overlap:
+        refuse_leak(identify, validate, ", or say --allow-overlap")
+    return identify, validate
+
+
+def _columns(log: ExperimentLog, settings: Settings, friction: bool, offset: bool) -> Columns:
+    rotor, symmetric = settings.rotor_inertia, settings.symmetric
+    return nominal_columns(
+        log.robot, friction=friction, offset=offset, rotor_inertia=rotor, symmetric=symmetric
     )
-    recipe = replace(fitted.recipe, known=None)
-    alone = fit_logs(means[:identify], columns, recipe, settings.weighted, rows[:identify])
-    judged = judge(alone, means[identify:], settings.blocks, rows[identify:])
-    return tuple(map(float, judged.errors.rms))
-
-
-def _friction_of(model: Arm | None, log: ExperimentLog) -> Arm | None:
-    if model is not None and model.n_joints != log.n_joints:
-        raise UsageError(
-            "C02",
-            f"the model has {model.n_joints} joints, {log.name} has {log.n_joints}",
-            where="--model",
-            remedy="give a model of this robot",
-        )
-    return model if model is not None and model.friction else None
 
 
 def _result(
     fitted: Fitted, judged: Judged, motions: Motions, arm: Arm, settings: Settings
 ) -> Result:
-    found = fitted.estimate
+    found, fits = fitted.estimate, len(fitted.motions)
     both = {"identify": fitted.errors, "validate": judged.errors}
-    torques = [(log, motion, torque_parts(arm, log, motion)) for log, motion in motions]
     growth, checked = found.convergence(), consistency(found, arm.body)
     names = [column.name for column in found.columns.names]
+    model = None if settings.model is None else Path(settings.model).name
+    given = fitted.recipe.known is not None
+    parts = [(log, motion, torques(arm, log, motion)) for log, motion in motions]
+    how = encode(replace(settings, model=model))[0]
     return Result(
         robot=arm.name,
         joints=tuple(joint.name for joint in arm.robot.joints),
@@ -210,12 +207,8 @@ def _result(
         held_out=judged.by,
         filter_hz=fitted.recipe.cutoff_hz,
         equations=tuple(map(int, found.statistics.counts)),
-        friction="fitted" if fitted.recipe.known is None else "given",
-        friction_of=""
-        if fitted.recipe.known is None
-        else "fit-friction"
-        if settings.model is None
-        else Path(settings.model).name,
+        friction="given" if given else "fitted",
+        friction_of=(model or "fit-friction") if given else "",
         physically_consistent=None if checked is None else checked.consistent,
         consistency=checked,
         balance=power_balance(found),
@@ -224,67 +217,21 @@ def _result(
         convergence_samples=growth.samples,
         convergence=growth.beta,
         convergence_std=growth.std,
-        courses=tuple(
-            course(log, motion, parts, fitted.recipe.cutoff_hz)
-            for log, motion, parts in torques[:_COURSES]
-        ),
+        courses=tuple(course(*one, fitted.recipe.cutoff_hz) for one in parts[:_COURSES]),
         arm=arm,
         model=arm.to_model(
-            validity=validity(motions[: len(fitted.motions)]),
-            sources=_sources(motions),
+            validity=validity(motions[:fits]),
+            # by the digest of either container
+            sources=tuple(
+                Source(log.name, digest_of(recording(log)), log.experiment, log.role)
+                for log, _ in motions
+            ),
             notes=(f"fitted by rrrid estimate-bps, motion by {settings.method}",),
         ),
-        derived=tuple(_derived(log, motion, parts, settings) for log, motion, parts in torques),
-    )
-
-
-def _chosen(inputs: Inputs, allow_overlap: bool) -> tuple[list[ExperimentLog], list[ExperimentLog]]:
-    logs = [opened.log for opened in inputs.logs if opened.log.origin != "planned"]
-    identify = [log for log in logs if log.role == "identify" and log.experiment in FITTED]
-    if not identify:
-        kinds = ", ".join(sorted({f"{log.experiment} ({log.role})" for log in logs})) or "none"
-        words = f"no excitation or free log of role identify; there are: {kinds}"
-        remedy = "record an excitation, or give the folder that has one"
-        raise NothingMatched("C06", words, inputs.label, remedy)
-    if len({log.robot_text for log in logs}) > 1:
-        raise UsageError(
-            "C02",
-            "logs of several robots",
-            where=inputs.label,
-            remedy="name the logs of one; 'rrrid run' takes a folder of several apart",
-        )
-    validate = [log for log in logs if log.role == "validate"]
-    if not allow_overlap:
-        refuse_leak(identify, validate, ", or say --allow-overlap")
-    return identify, validate
-
-
-def _derived(
-    log: ExperimentLog, motion: Reconstructed, parts: ArmTorque, settings: Settings
-) -> tuple[str, ExperimentLog]:
-    with_motion = derive(
-        log, "reconstruct", settings.reconstruction.as_settings(), motion.signals()
-    )
-    total = parts.total
-    settings = replace(
-        settings, model=None if settings.model is None else Path(settings.model).name
-    )
-    signals = {
-        "tau_model": total,
-        "tau_inertia": parts.inertia,
-        "tau_coriolis": parts.coriolis,
-        "tau_gravity": parts.gravity,
-        "tau_friction_model": parts.friction,
-        "tau_effects": parts.effects,
-        "tau_residual": log.tau - total,
-    }
-    return slug(log.name), derive(with_motion, "estimate-bps", encode(settings)[0], signals)
-
-
-def _sources(motions: Motions) -> tuple[Source, ...]:
-    """Return the recordings behind the model, by the digest of either container."""
-    return tuple(
-        Source(log.name, digest_of(recording(log)), log.experiment, log.role) for log, _ in motions
+        derived=tuple(
+            with_torques(log, motion, settings.reconstruction, own, "estimate-bps", how)
+            for log, motion, own in parts
+        ),
     )
 
 

@@ -11,21 +11,22 @@ Source   Kostić et al. 2004, Sections III.B and IV.C.5, eq. (9), (23), (24), Fi
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from pipelines.dynamics.arm import Arm, ArmTorque
+from pipelines.dynamics.arm import Arm
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
+from pipelines.estimation.estimate import refuse_leak
 from pipelines.estimation.motion import Reconstructed, Reconstruction, reconstruct
-from pipelines.estimation.result import torques
+from pipelines.estimation.result import of_this_robot, torques, with_torques
 from pipelines.friction.in_folder import fitted_in_folder
 from pipelines.importers.controller import controller_table, write_controller_table
 from pipelines.importers.recipe import Recipe
 from pipelines.io.files import write_log
-from pipelines.io.log import ExperimentLog, derive, digest_of, recording
+from pipelines.io.log import ExperimentLog, digest_of, recording
 from pipelines.io.model_file import ModelFile, read_model
 from pipelines.io.option import option
 from pipelines.io.robot import RobotDescription
@@ -94,12 +95,8 @@ def read(request: Request, settings: Settings) -> Inputs:
         UsageError: C02, neither logs nor a task; C04, no such file.
     """
     if not (request.paths or request.roles or settings.designs):
-        raise UsageError(
-            "C02",
-            "no logs, and no text to write",
-            where="validate-writing",
-            remedy="name logs to validate on; of an RRR arm, --text RRR designs the task",
-        )
+        remedy = "name logs to validate on; of an RRR arm, --text RRR designs the task"
+        raise UsageError("C02", "no logs, and no text to write", "validate-writing", remedy)
     read_any = request.paths or request.roles
     inputs = read_logs(request, settings) if read_any else Inputs()
     found = settings.model if settings.model is not None else _left_in(request.paths)
@@ -170,12 +167,9 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     judges = [log for log in logs if log.role == "validate"]
     if not judges:
         kinds = ", ".join(sorted({f"{log.experiment} ({log.role})" for log in logs})) or "none"
-        raise NothingMatched(
-            "C06",
-            f"no log of role validate; there are: {kinds}",
-            where=inputs.label,
-            remedy="record another motion with role validate; --text designs one for RRR arms",
-        )
+        words = f"no log of role validate; there are: {kinds}"
+        remedy = "record another motion with role validate; --text designs one for RRR arms"
+        raise NothingMatched("C06", words, inputs.label, remedy)
     arm, said = _model(inputs, logs, judges)
     pairs, checks = _examined(sorted(judges, key=lambda log: log.experiment != "writing"))
     parts = [torques(arm, log, motion) for log, motion in pairs]
@@ -191,8 +185,9 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     if settings.simulate:
         simulated, not_simulated = validation.simulated_task(pairs, arm)
     gates, failed = validation.gates_of(torque, cases, settings.torque_gate, arm.robot.name)
+    how = {"model": None if settings.model is None else Path(settings.model).name}
     derived = tuple(
-        _derived(log, motion, own, settings)
+        with_torques(log, motion, Reconstruction(), own, "validate-writing", how)
         for (log, motion), own in zip(pairs, parts, strict=True)
     )
     return Result(
@@ -232,57 +227,32 @@ def _model(
     """Return the model to judge and where it comes from; never one that was fitted to `judges`."""
     given = inputs.material
     if isinstance(given, Arm) and given.p.any():
-        return _of_this_robot(given, judges[0]), "estimate-bps, on the logs of role identify"
+        return of_this_robot(given, judges[0]), "estimate-bps, on the logs of role identify"
     if (
         isinstance(given, Material)
         and (model := given.model) is not None
         and (given.named or any(p.value for p in model.base_parameters))
     ):
         fitted = {source.sha256 for source in model.sources if source.role == "identify"}
-        _refuse_leak(log for log in judges if digest_of(recording(log)) in fitted)
+        for log in judges:
+            if digest_of(recording(log)) in fitted:
+                words = f"leak: the model was fitted to {log.name}, which shall judge it"
+                where, remedy = log.source or log.name, "judge on another recording"
+                raise InputRejected("D14", words, where, remedy)
         arm = Arm.from_model(model, given.said)
         if not arm.p.any():
-            raise UsageError(
-                "C02",
-                "the model holds friction alone, no inertia",
-                where="--model",
-                remedy="name the model.json of estimate-bps",
-            )
-        return _of_this_robot(arm, judges[0]), given.said
-    seen = {log.q.tobytes() + log.tau.tobytes() for log in logs if log.role == "identify"}
-    _refuse_leak(log for log in judges if log.q.tobytes() + log.tau.tobytes() in seen)
+            words = "the model holds friction alone, no inertia"
+            raise UsageError("C02", words, "--model", "name the model.json of estimate-bps")
+        return of_this_robot(arm, judges[0]), given.said
+    refuse_leak([log for log in logs if log.role == "identify"], judges)
     if (here := fitted_in_folder(logs)) is None:
-        raise NothingMatched(
-            "C06",
-            "no model to validate, and no excitation or free log of role identify to fit one",
-            where=inputs.label,
-            remedy="give --model model.json, or the folder that has such logs",
-        )
+        words = "no model to validate, and no excitation or free log of role identify to fit one"
+        remedy = "give --model model.json, or the folder that has such logs"
+        raise NothingMatched("C06", words, inputs.label, remedy)
     order = "base parameters and friction together"
     if _friction_held(here):
         order = "friction first, then the base parameters"
     return here, f"fitted here to the logs of role identify: {order}"
-
-
-def _of_this_robot(arm: Arm, log: ExperimentLog) -> Arm:
-    if arm.n_joints != log.n_joints:
-        raise UsageError(
-            "C02",
-            f"the model has {arm.n_joints} joints, {log.name} has {log.n_joints}",
-            where="--model",
-            remedy="give a model of this robot",
-        )
-    return arm
-
-
-def _refuse_leak(leaks: Iterable[ExperimentLog]) -> None:
-    for log in leaks:
-        raise InputRejected(
-            "D14",
-            f"leak: the model was fitted to {log.name}, which shall judge it",
-            where=log.source or log.name,
-            remedy="judge on another recording",
-        )
 
 
 def _drawn_from(arm: Arm) -> str:
@@ -304,50 +274,21 @@ def _friction_held(arm: Arm) -> bool:
 
 def _refuse_strange(settings: Settings) -> None:
     """Raise C02 for a setting that makes no sense."""
-    longest = CONFIG.longest
-    letters, gate = len(settings.text or ""), settings.torque_gate
-    for wrong, message, where, remedy in (
-        (
-            settings.elbow not in (None, "up", "down"),
-            f"'{settings.elbow}' is no side of an elbow",
-            "--elbow",
-            "say up or down",
-        ),
-        (
-            not (math.isfinite(gate) and gate > 0.0),
-            f"a gate of {gate:g}",
-            "--torque-gate",
-            "give a relative error above 0",
-        ),
-        (
-            not 1 <= settings.draws <= CONFIG.most_draws,
-            f"{settings.draws} draws",
-            "--draws",
-            f"give 1 to {CONFIG.most_draws}",
-        ),
-        (letters > longest, f"a text of {letters} letters", "--text", f"give {longest} at most"),
-        (settings.seed < 0, f"the seed {settings.seed} is negative", "--seed", "give 0 or more"),
-    ):
-        if wrong:
-            raise UsageError("C02", message, where=where, remedy=remedy)
-
-
-def _derived(
-    log: ExperimentLog, motion: Reconstructed, parts: ArmTorque, settings: Settings
-) -> tuple[str, ExperimentLog]:
-    with_motion = derive(log, "reconstruct", Reconstruction().as_settings(), motion.signals())
-    total = parts.total
-    how = {"model": None if settings.model is None else Path(settings.model).name}
-    signals = {
-        "tau_model": total,
-        "tau_inertia": parts.inertia,
-        "tau_coriolis": parts.coriolis,
-        "tau_gravity": parts.gravity,
-        "tau_friction_model": parts.friction,
-        "tau_effects": parts.effects,
-        "tau_residual": log.tau - total,
-    }
-    return slug(log.name), derive(with_motion, "validate-writing", how, signals)
+    letters, gate, draws = len(settings.text or ""), settings.torque_gate, settings.draws
+    side = "say up or down"
+    if settings.elbow not in (None, "up", "down"):
+        raise UsageError("C02", f"'{settings.elbow}' is no side of an elbow", "--elbow", side)
+    if not 0.0 < gate < math.inf:
+        words, remedy = f"a gate of {gate:g}", "give a relative error above 0"
+        raise UsageError("C02", words, "--torque-gate", remedy)
+    if not 1 <= draws <= CONFIG.most_draws:
+        raise UsageError("C02", f"{draws} draws", "--draws", f"give 1 to {CONFIG.most_draws}")
+    if letters > CONFIG.longest:
+        remedy = f"give {CONFIG.longest} at most"
+        raise UsageError("C02", f"a text of {letters} letters", "--text", remedy)
+    if settings.seed < 0:
+        words = f"the seed {settings.seed} is negative"
+        raise UsageError("C02", words, "--seed", "give 0 or more")
 
 
 def _designed(inputs: Inputs, settings: Settings) -> Result:
@@ -394,12 +335,8 @@ def _torque_of(given: Material, robot: RobotDescription, inputs: Inputs) -> Arm 
     if given.model is not None:
         arm = Arm.from_model(given.model, "--model")
         if arm.n_joints != robot.n_joints:
-            raise UsageError(
-                "C02",
-                f"the model has {arm.n_joints} joints, the robot {robot.n_joints}",
-                where="--model",
-                remedy="give a model of this robot",
-            )
+            words = f"the model has {arm.n_joints} joints, the robot {robot.n_joints}"
+            raise UsageError("C02", words, "--model", "give a model of this robot")
         return arm
     fitted = fitted_in_folder([opened.log for opened in inputs.logs]) if inputs.logs else None
     if fitted is None and all(joint.link is not None for joint in robot.joints):

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from pipelines.dynamics.arm import Arm, ArmTorque
-from pipelines.errors import Check
+from pipelines.errors import Check, UsageError
 from pipelines.estimation.balance import Balance
 from pipelines.estimation.checks.boundary import Boundary
 from pipelines.estimation.consistency import Consistent
 from pipelines.estimation.estimate import Fitted
 from pipelines.estimation.filters import choose_decimation, design_low_pass, zero_phase
 from pipelines.estimation.mean_period import PeriodicLog
-from pipelines.estimation.motion import Motions, Reconstructed
+from pipelines.estimation.motion import Motions, Reconstructed, Reconstruction
 from pipelines.estimation.regression import bridged, cutoff_at
-from pipelines.io.log import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog, derive
 from pipelines.io.model_file import ModelFile, Validity
+from pipelines.io.output import slug
 from pipelines.io.results import NOT_STORED
 
 _POINTS = 6000  # numerics: of a figure
@@ -119,6 +122,14 @@ def parameters(fitted: Fitted, arm: Arm) -> tuple[Estimated, ...]:
     return tuple(rows)
 
 
+def of_this_robot(arm: Arm, log: ExperimentLog) -> Arm:
+    """Return a model that was given; C02 where it has other joints than the log."""
+    if arm.n_joints != log.n_joints:
+        words = f"the model has {arm.n_joints} joints, {log.name} has {log.n_joints}"
+        raise UsageError("C02", words, where="--model", remedy="give a model of this robot")
+    return arm
+
+
 def torques(arm: Arm, log: ExperimentLog, motion: Reconstructed) -> ArmTorque:
     """Return the model's torque as the log counts it: a held command is averaged over samples."""
     parts = arm.torque_parts(motion.motion)
@@ -126,6 +137,33 @@ def torques(arm: Arm, log: ExperimentLog, motion: Reconstructed) -> ArmTorque:
         return parts
     each = (parts.inertia, parts.coriolis, parts.gravity, parts.friction, parts.effects)
     return ArmTorque(*(np.vstack([0.5 * (x[1:] + x[:-1]), x[-1:]]) for x in each))
+
+
+def with_torques(
+    log: ExperimentLog,
+    motion: Reconstructed,
+    how: Reconstruction,
+    parts: ArmTorque,
+    command: str,
+    settings: Mapping[str, Any],
+) -> tuple[str, ExperimentLog]:
+    """Return the file name of a derived log, and the log with its motion and the model's torque.
+
+    Args:
+        how: how the motion was reconstructed.
+        command, settings: what derived the torque.
+    """
+    signals = {
+        "tau_model": parts.total,
+        "tau_inertia": parts.inertia,
+        "tau_coriolis": parts.coriolis,
+        "tau_gravity": parts.gravity,
+        "tau_friction_model": parts.friction,
+        "tau_effects": parts.effects,
+        "tau_residual": log.tau - parts.total,
+    }
+    moved = derive(log, "reconstruct", how.as_settings(), motion.signals())
+    return slug(log.name), derive(moved, command, settings, signals)
 
 
 def course(
