@@ -24,7 +24,7 @@ from pipelines.diagnosis.unnamed import Key
 from pipelines.estimation.candidate_columns import place_of
 from pipelines.estimation.model_fit import no_better, worse_log
 from pipelines.estimation.preparation import Prepared
-from pipelines.estimation.residual_analysis import Evidence, evidence, with_simulation
+from pipelines.estimation.residual_analysis import Evidence, evidence
 
 __all__ = ["WEAKER", "answer"]
 
@@ -90,8 +90,8 @@ def answer(
 
 def _evidence(worth: Worth, last: int) -> Evidence:
     """Return what the nominal model leaves, and the position errors of the simulated arms."""
-    one = evidence(worth.trained.models[0], worth.floor)
-    return with_simulation(one, worth.simulated[0], worth.simulated[last])
+    nominal = worth.trained.models[0]
+    return evidence(nominal, worth.floor, worth.simulated[0], worth.simulated[last])
 
 
 def _limits(found: Found, findings: Sequence[Finding], exclude: Sequence[str]) -> Limits:

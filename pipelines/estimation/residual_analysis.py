@@ -1,6 +1,6 @@
 """Analyse what a fitted model leaves: over time, and against all that it may depend on.
 
-    evidence(fit, floor)              the residual over time, and against all that it may depend on
+    evidence(fit, floor, …)           the residual over time, and against all that it may depend on
     proof(before, after, joint, …)    of the joint that shows most of a finding
 
 A joint that goes to and fro over a part of a turn is longer at some angles than at others.
@@ -10,8 +10,8 @@ range (von Hann's window): 2 |Σ w(q) x e^(-jkq)| / Σ w(q), x less its mean.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -92,55 +92,44 @@ class Evidence:
     extended_position_error: Array | None = None  # [rad] (points, joints) of the extended model
 
 
-@dataclass(frozen=True, eq=False)
-class Signal:
-    """One signal at the moments of one joint's rows, logs one behind the other."""
-
-    name: str
-    unit: str
-    values: Array  # (rows of the joint,)
+# name, unit, and values at the moments of one joint's rows, logs one behind the other
+Signal = tuple[str, str, Array]
 
 
-@dataclass(frozen=True, eq=False)
-class Binned:
-    """Means of one quantity over another. Each (bins,)."""
-
-    x: Array
-    mean: Array
-    spread: Array  # standard deviation within the bin
-    count: Array
-
-    @property
-    def power(self) -> float:
-        """The sum of squares of the means."""
-        return float(np.sum(self.count * self.mean**2))
-
-
-def binned(x: Array, y: Array, bins: int = _CONFIG.curve_bins) -> Binned:
-    """Return `y` over `x`, in bins of equal count."""
+def binned(x: Array, y: Array, bins: int = _CONFIG.curve_bins) -> tuple[Array, Array, Array, Array]:
+    """Return x, mean and standard deviation of `y`, and count, in bins of equal count of `x`."""
     order = np.argsort(x, kind="stable")
     edges = np.linspace(0, len(x), min(bins, max(1, len(x) // _CONFIG.rows)) + 1).astype(int)
     first, count = edges[:-1], np.diff(edges).astype(np.float64)
     mean_x, mean, square = (np.add.reduceat(v[order], first) / count for v in (x, y, y**2))
-    return Binned(mean_x, mean, np.sqrt(np.maximum(square - mean**2, 0.0)), count)
+    return mean_x, mean, np.sqrt(np.maximum(square - mean**2, 0.0)), count
 
 
-def signals(data: Data, joint: int, load: Array) -> Iterator[Signal]:
+def _followed(signal: Signal, y: Array) -> float:
+    """Return the power of `y` that survives averaging over a signal: the sum of squared means."""
+    _, mean, _, count = binned(signal[2], y)
+    return float(np.sum(count * mean**2))
+
+
+def signals(data: Data, joint: int, load: Array) -> list[Signal]:
     """Return what the residual of `joint` (from 0) may depend on; `load` (rows,) is the torque."""
     revolute = data.logs[0].log.robot.revolute
     q, dq = (_at_rows(data, name) for name in ("q", "dq"))
     angle, force = ("rad", "N m") if revolute[joint] else ("m", "N")
-    yield Signal("time", "s", np.concatenate([one.t - one.t[0] for one in data.logs]))
-    yield Signal("position", angle, q[:, joint])
-    yield Signal("speed", f"{angle}/s", dq[:, joint])
-    yield Signal("load", force, load[data.joint == joint])
     travel = np.concatenate([_travel(one, joint) for one in data.logs])
-    yield Signal("travel since reversal", angle, travel)
+    found = [
+        ("time", "s", np.concatenate([one.t - one.t[0] for one in data.logs])),
+        ("position", angle, q[:, joint]),
+        ("speed", f"{angle}/s", dq[:, joint]),
+        ("load", force, load[data.joint == joint]),
+        ("travel since reversal", angle, travel),
+    ]
     for other, turns in enumerate(revolute):
         if other != joint:
             unit = "rad" if turns else "m"
-            yield Signal(f"position of joint {other + 1}", unit, q[:, other])
-            yield Signal(f"speed of joint {other + 1}", f"{unit}/s", dq[:, other])
+            found.append((f"position of joint {other + 1}", unit, q[:, other]))
+            found.append((f"speed of joint {other + 1}", f"{unit}/s", dq[:, other]))
+    return found
 
 
 def _at_rows(data: Data, name: str) -> Array:
@@ -150,8 +139,7 @@ def _at_rows(data: Data, name: str) -> Array:
 def _travel(one: LogData, joint: int) -> Array:
     """Return the signed distance from where the joint last reversed."""
     q = one.motion.q[:, joint]
-    turns = np.flatnonzero(np.diff(np.sign(one.motion.dq[:, joint])) != 0) + 1
-    begin = np.concatenate([[0], turns])
+    begin = np.append(0, np.flatnonzero(np.diff(np.sign(one.motion.dq[:, joint])) != 0) + 1)
     which = np.searchsorted(begin, np.arange(len(q)), side="right") - 1
     return np.asarray(one.at_rows(q - q[begin[which]]))
 
@@ -169,55 +157,63 @@ def amplitudes(q: Array, x: Array) -> tuple[Array, Array]:
     parts = max(1, int(np.ceil(span * _ORDERS[-1] / (2.0 * np.pi * _CONFIG.part))))
     part = np.minimum((along * parts).astype(int), parts - 1)
     count = np.bincount(part, minlength=parts)[part]
-    weight = np.minimum(1.0 / count, _CONFIG.rare * parts / len(q))
-    weight *= np.sin(np.pi * along) ** 2
-    rest = weight * (x - weight @ x / max(float(weight.sum()), 1e-300))
+    weight = np.minimum(1.0 / count, _CONFIG.rare * parts / len(q)) * np.sin(np.pi * along) ** 2
+    total = max(float(weight.sum()), 1e-300)
+    rest = weight * (x - weight @ x / total)
     size = [abs(rest @ np.exp(-1j * order * q)) for order in orders]
-    return orders, 2.0 * np.asarray(size, dtype=np.float64) / max(float(weight.sum()), 1e-300)
+    return orders, 2.0 * np.asarray(size, dtype=np.float64) / total
 
 
-def evidence(done: Refined, floor: Array) -> Evidence:
-    """Return the residual of the nominal model over the first log, curves and spectra over all."""
+def evidence(done: Refined, floor: Array, nominal: Simulation, extended: Simulation) -> Evidence:
+    """Return the residual of the nominal model over the first log, curves and spectra over all,
+    and the position errors of both models where both ran in closed loop.
+    """
     data, left, n = done.data, done.left, done.data.n_joints
     predicted = data.y - left
     measured, modelled, rest = (next(iter(data.split(x))).T for x in (data.y, predicted, left))
-    curves, spectra = list[Curve](), list[Spectrum]()
+    curves, spectra, bands = list[Curve](), list[Spectrum](), np.full((n, 2), np.nan)
+    parts = list(data.split(left))
+    longest = max(range(len(parts)), key=lambda k: len(parts[k][0]))
     for joint in range(n):
         own = left[data.joint == joint]
+        power = max(float(own @ own), 1e-300)
         for one in signals(data, joint, predicted):
-            means = binned(one.values, own)
-            share = means.power / max(float(own @ own), 1e-300)
-            curve = (means.x, means.mean, means.spread, share)
-            curves.append(Curve(joint + 1, one.name, one.unit, *curve))
-        spectra += _spectra(data, left, joint)
-    every = max(1, -(-len(measured) // _CONFIG.series))
+            x, mean, spread, count = binned(one[2], own)
+            share = float(np.sum(count * mean**2)) / power
+            curves.append(Curve(joint + 1, one[0], one[1], x, mean, spread, share))
+        lines = _over_frequency(data.logs[longest], parts[longest][joint])
+        if lines is not None:
+            spectra.append(Spectrum(joint + 1, "frequency", "Hz", *lines))
+            total = np.cumsum(np.square(lines[1])) / max(float(np.sum(lines[1] ** 2)), 1e-300)
+            ends = np.searchsorted(total, (0.5 - 0.5 * _CONFIG.band, 0.5 + 0.5 * _CONFIG.band))
+            bands[joint] = lines[0][np.minimum(ends, len(total) - 1)]
+        orders, waves = amplitudes(_at_rows(data, "q")[:, joint], own)
+        if len(orders):
+            unit = "1/rev" if data.logs[0].log.robot.revolute[joint] else "1/(2 pi m)"
+            spectra.append(Spectrum(joint + 1, "order", unit, orders, waves))
+    every = slice(None, None, max(1, -(-len(measured) // _CONFIG.series)))
+    first = nominal.first if extended.first is not None else None
+    shown = slice(0)
+    if first is not None:
+        samples = int(np.searchsorted(first.t, _CONFIG.seconds))
+        shown = slice(0, samples, max(1, samples // _CONFIG.points))
     return Evidence(
-        data.logs[0].log.name,
-        data.logs[0].t[::every],
-        measured[::every],
-        modelled[::every],
-        rest[::every],
-        None,
-        None,
-        tuple(curves),
-        tuple(spectra),
-        np.clip(1.0 - np.square(floor / done.rms), 0.0, 1.0),
-        _bands(spectra, n),
+        log=data.logs[0].log.name,
+        t=data.logs[0].t[every],
+        measured=measured[every],
+        predicted=modelled[every],
+        residual=rest[every],
+        simulated_t=None if first is None else first.t[shown],
+        simulated_position_error=None if first is None else first.error[shown],
+        curves=tuple(curves),
+        spectra=tuple(spectra),
+        above_noise_floor=np.clip(1.0 - np.square(floor / done.rms), 0.0, 1.0),
+        band=bands,
+        simulated_log="" if first is None else first.log,
+        extended_position_error=None
+        if first is None or extended.first is None
+        else extended.first.error[shown],
     )
-
-
-def _spectra(data: Data, left: Array, joint: int) -> list[Spectrum]:
-    """Return the spectra over frequency, of the longest log, and over orders of the angle."""
-    found, q = list[Spectrum](), _at_rows(data, "q")[:, joint]
-    parts = [(one, x[joint]) for one, x in zip(data.logs, data.split(left), strict=True)]
-    own = _over_frequency(*max(parts, key=lambda part: len(part[1])))
-    if own is not None:
-        found.append(Spectrum(joint + 1, "frequency", "Hz", *own))
-    orders, waves = amplitudes(q, left[data.joint == joint])
-    if len(orders):
-        unit = "1/rev" if data.logs[0].log.robot.revolute[joint] else "1/(2 pi m)"
-        found.append(Spectrum(joint + 1, "order", unit, orders, waves))
-    return found
 
 
 def _over_frequency(one: LogData, x: Array) -> tuple[Array, Array] | None:
@@ -230,18 +226,6 @@ def _over_frequency(one: LogData, x: Array) -> tuple[Array, Array] | None:
     step = float(np.median(np.diff(one.t)))
     frequency, density = welch(x[:, None], 1.0 / step, min(_CONFIG.segment, len(x) // 2))
     return frequency, np.sqrt(density[:, 0] * (frequency[1] - frequency[0]))
-
-
-def _bands(spectra: list[Spectrum], joints: int) -> Array:
-    """Return the bands (joints, 2) [Hz] that hold most of the residual's power."""
-    out = np.full((joints, 2), np.nan)
-    for one in spectra:
-        if one.over == "frequency":
-            power = np.square(one.amplitude)
-            total = np.cumsum(power) / max(float(power.sum()), 1e-300)
-            ends = np.searchsorted(total, (0.5 - 0.5 * _CONFIG.band, 0.5 + 0.5 * _CONFIG.band))
-            out[one.joint - 1] = one.x[np.minimum(ends, len(one.x) - 1)]
-    return out
 
 
 def proof(
@@ -259,45 +243,40 @@ def proof(
     data = before.data
     three = (before.left, after.left, before.left - after.left)
     shown = joint - 1 if joint is not None else int(np.argmax(data.rms(three[2]) / before.rms))
-    own = data.joint == shown
-    parts = [x[own] for x in three]
+    parts = [x[data.joint == shown] for x in three]
     t, rows = _stretch(data, parts[2])
     over_time = (t, *(x[rows] for x in parts))
     if log is not None:
-        there = data.log_of[own] == log
-        best = Signal("time", "s", data.logs[log].t)
+        there = data.log_of[data.joint == shown] == log
+        best: Signal = ("time", "s", data.logs[log].t)
         return _over(best, [x[there] for x in parts], shown, over_time)
     time, *others = signals(data, shown, data.y - before.left)
-    power = {one: binned(one.values, parts[2]).power for one in (time, *others)}
+    power = {one[0]: _followed(one, parts[2]) for one in (time, *others)}
     # in a log that goes once through its range anything is shown over time: when, and not by what
-    best = max(others, key=lambda one: power[one])
-    if event or power[best] < _CONFIG.as_much * power[time]:
+    best = max(others, key=lambda one: power[one[0]])
+    if event or power[best[0]] < _CONFIG.as_much * power["time"]:
         best = time
-    if not event and power[best] < _CONFIG.shown * float(parts[2] @ parts[2]):
-        place = max(range(len(data.logs)), key=lambda k: _power_in(data, three[2], k, shown))
-        lines = [
-            _over_frequency(data.logs[place], list(data.split(x))[place][shown]) for x in three
-        ]
+    if not event and power[best[0]] < _CONFIG.shown * float(parts[2] @ parts[2]):
+        own = [[x[shown] for x in data.split(whole)] for whole in three]
+        place = max(range(len(own[2])), key=lambda k: float(np.sum(np.square(own[2][k]))))
+        lines = [_over_frequency(data.logs[place], x[place]) for x in own]
         if found := [one for one in lines if one is not None]:
             hertz, none = found[0][0], np.zeros(len(found[0][0]))
-            without, with_it, predicted = (lines for _, lines in found)
+            without, with_it, predicted = (amplitude for _, amplitude in found)
             curves = (hertz, without, with_it, predicted, none)
             return Proof(shown + 1, "frequency", "Hz", *curves, *over_time)
     return _over(best, parts, shown, over_time)
 
 
-def _power_in(data: Data, x: Array, log: int, joint: int) -> float:
-    return float(np.sum(np.square(list(data.split(x))[log][joint])))
-
-
 def _over(
-    signal: Signal, parts: list[Array], joint: int, over_time: tuple[Array, Array, Array, Array]
+    signal: Signal, parts: Sequence[Array], joint: int, over_time: tuple[Array, ...]
 ) -> Proof:
     """Return `parts`, without the finding, with it and what it predicts, over a signal."""
-    before, after, predicted = (binned(signal.values, x, _CONFIG.bins) for x in parts)
-    curves = (before.x, before.mean, after.mean, predicted.mean)
-    spread = before.spread / np.sqrt(before.count)
-    return Proof(joint + 1, signal.name, signal.unit, *curves, spread, *over_time)
+    name, unit, values = signal
+    x, without, spread, count = binned(values, parts[0], _CONFIG.bins)
+    with_it, predicted = (binned(values, part, _CONFIG.bins)[1] for part in parts[1:])
+    curves = (x, without, with_it, predicted, spread / np.sqrt(count))
+    return Proof(joint + 1, name, unit, *curves, *over_time)
 
 
 def _stretch(data: Data, predicted: Array) -> tuple[Array, slice]:
@@ -306,7 +285,6 @@ def _stretch(data: Data, predicted: Array) -> tuple[Array, slice]:
     The variance, not the power: a joint at rest shows a constant, which proves nothing.
     """
     first, best, found = 0, -1.0, slice(0, 0)
-    times = np.concatenate([one.t for one in data.logs])
     for one in data.logs:
         step = float(np.median(np.diff(one.t))) if one.rows > 1 else 1.0
         size = max(2, min(one.rows, round(_CONFIG.stretch / step)))
@@ -315,20 +293,4 @@ def _stretch(data: Data, predicted: Array) -> tuple[Array, slice]:
             if power > best:
                 best, found = power, slice(start, start + size)
         first += one.rows
-    return times[found], found
-
-
-def with_simulation(one: Evidence, nominal: Simulation, extended: Simulation) -> Evidence:
-    """Return the analysis with the position errors of both arms, where both ran in closed loop."""
-    if nominal.first is None or extended.first is None:
-        return one
-    first, other = nominal.first, extended.first.error
-    samples = int(np.searchsorted(first.t, _CONFIG.seconds))
-    shown = slice(0, samples, max(1, samples // _CONFIG.points))
-    return replace(
-        one,
-        simulated_t=first.t[shown],
-        simulated_position_error=first.error[shown],
-        simulated_log=first.log,
-        extended_position_error=other[shown],
-    )
+    return np.concatenate([one.t for one in data.logs])[found], found

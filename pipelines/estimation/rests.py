@@ -91,4 +91,4 @@ def _rests(motions: Motions, cutoff_hz: float | None) -> list[Mask]:
 
 
 def _rms(parts: Sequence[Array]) -> Array:
-    return np.maximum(np.sqrt(np.mean(np.vstack(parts) ** 2, axis=0)), 1e-300)
+    return np.asarray(np.maximum(np.sqrt(np.mean(np.vstack(parts) ** 2, axis=0)), 1e-300))
