@@ -279,15 +279,11 @@ class PlausibilityConfig:
     shared_bad: float = 0.01  # the same with one set of parameters
     scale_better: float = 0.25  # of the residual before
     worse: float = 1.03  # times what a row left before: chance
-    either: float = 1.5  # of two explanations that these rows cannot tell apart
     # signs and sizes
     doubled: float = 3.0  # 2² - 1: growth of the squared residual when the residual doubles
     sure: float = 5.0  # standard deviations
     ratio: float = 2.5  # a load of a quarter of the arm's mass doubles a joint's inertia at most
     ratio_residual: float = 0.25
-    explained: float = 0.1  # residual of a torque that is explained
-    unexplained: float = 0.3  # of one that is not; a saturated or touched arm is not so clear
-    apart: float = 5.0  # times the others' residuals
     # clocks
     timed: float = 0.2  # residual up to which a joint's torque is understood well enough to time
     moments: float = 4.0  # a parameter of a row, at least
@@ -296,16 +292,3 @@ class PlausibilityConfig:
     # Times the bound of a drift, beyond which a log is refused: what friction remembers of a
     # reversal drifted by 1.3 bounds in a healthy arm, and a log that is refused is lost.
     drifts: float = 2.0
-
-
-@dataclass(frozen=True)
-class TorqueScaleConfig:
-    """When one joint's torque has another scale than the others'."""
-
-    least: float = 1.8  # a drive whose gain is off by less is a fault that `diagnose` measures
-    most: float = 200.0
-    # relative residual of all rows with one set of parameters: with more, torque of another drive
-    # in a joint, or a clipped one, would pass for a scale
-    bad: float = 0.02
-    better: float = 0.4  # of the residual before
-    as_good: float = 1.3  # times the least residual

@@ -31,14 +31,14 @@ from pipelines.estimation.checks.joint_rows import (
     row_fits,
     sample_motion,
 )
-from pipelines.estimation.config import PlausibilityConfig, TorqueScaleConfig
+from pipelines.estimation.config import PlausibilityConfig
 from pipelines.estimation.judgements import excited
 from pipelines.estimation.least_squares import Indices
 from pipelines.io.log import Array
-from pipelines.quality.subject import NotTested, Subject, spread
+from pipelines.quality.subject import NotTested, Place, Subject, spread
 from pipelines.simulation.commanded import against_command
 
-_CONFIG, _SCALE = PlausibilityConfig(), TorqueScaleConfig()
+_CONFIG = PlausibilityConfig()
 Findings = Sequence[Check | NotTested]
 
 _FACTORS = {
@@ -54,7 +54,6 @@ _FACTORS = {
 }
 # what a file may have every angle in
 _ANGLE_UNITS = {name: factor for name, factor in _FACTORS.items() if "pi" in name}
-_GRID, _FINER = 25, 6  # numerics: points, and how often a grid is laid about the best of the last
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +87,31 @@ class Evidence:
         """Fewer moments, for questions that need a new factorisation each."""
         most = 5 * max(row.basis.shape[1] for row in self.rows)
         return self.motion.every(max(1, len(self.motion.t) // most))
+
+    @cached_property
+    def slopes(self) -> dict[int, float]:
+        """Torque over that of the described links, of each joint (from 0) that they explain."""
+        known, motion, slopes = self.body.known_parameters(), self.motion, dict[int, float]()
+        if known is None:
+            return slopes
+        expected = self.body.torque(motion.q, motion.dq, motion.ddq, known)
+        for j in self.telling.tolist():
+            tau = motion.tau[:, j]
+            columns = [motion.dq[:, j], motion.coulomb[:, j], np.ones(len(tau)), expected[:, j]]
+            design = np.stack(columns, axis=1)
+            fits = [np.linalg.lstsq(design[:, :k], tau, rcond=None)[0] for k in (3, 4)]
+            without, left = (np.linalg.norm(tau - design[:, : len(f)] @ f) for f in fits)
+            # else the described links are not this arm's; they say nothing
+            size = np.linalg.norm(tau - tau.mean())
+            if left <= _CONFIG.ratio_residual * size and left <= 0.4 * without:
+                slopes[j] = float(fits[1][3])
+        return slopes
+
+    @property
+    def far(self) -> dict[int, float]:
+        """The slopes that no load and no friction explains."""
+        far = _CONFIG.ratio
+        return {j: s for j, s in self.slopes.items() if s > far or 0 < s < 1 / far}
 
     def alone(self, motion: Sampled) -> Array:
         """(telling joints,) residual of each by parameters of its own."""
@@ -171,31 +195,23 @@ def _encoder_scale(e: Evidence) -> list[Check]:
 
     First with one set of rigid parameters for all rows, where the scale of a joint tells that bends
     nothing and moves little. Then with parameters of its own for each row, where a joint's angle
-    bends the arm: that holds whatever the torques' scales. Where bending does not tell, the
-    torque's own scale may explain as much: then that is said as well, or instead.
+    bends the arm: that holds whatever the torques' scales.
     """
-    shared = True
-    found = _scaled(e, e.together, _CONFIG.shared_bad)
-    if found is None:
-        shared, found = False, _scaled(e, e.alone, _CONFIG.scale_bad)
-    if found is None:
+    found = _scaled(e, e.together, _CONFIG.shared_bad) or _scaled(e, e.alone, _CONFIG.scale_bad)
+    if found is None or found[2] in e.far:  # what the described links show of a torque
         return []
     before, after, joint, factor = found
-    residual, say = f"residual {before:.2g} -> {after:.2g}", e.subject.say
     if joint is None:
-        words = f"q fits if every angle is multiplied by {factor}, {residual}"
+        words = f"q fits if every angle is multiplied by {factor}"
         remedy = "correct the unit of the angles on import, rad or deg or turns: it is declared "
         remedy += "for all of them"
-        return [say("S15", "warn", words, signal="q", gate=True, remedy=remedy)]
-    words = f"q of joint {joint + 1} fits if multiplied by {factor}, {residual}"
-    remedy = "correct the gear ratio, the direction or the counts per turn of this encoder"
-    torque = torque_scale(e) if shared else None
-    if torque and torque.joint == joint and torque.after <= _CONFIG.either * after:
-        if after >= _CONFIG.either * torque.after:
-            return []
-        words += f"; so does its tau divided by {torque.factor:.3g}"
-        remedy += ", or the gear ratio or torque constant of this torque"
-    return [say("S15", "warn", words, signal="q", joint=joint, gate=True, remedy=remedy)]
+    else:
+        words = f"q of joint {joint + 1} fits if multiplied by {factor}"
+        remedy = "correct the gear ratio, the direction or the counts per turn of this encoder; of "
+        remedy += "a joint that bends nothing, a wrong torque constant looks alike"
+    words += f", residual {before:.2g} -> {after:.2g}"
+    place: Place = {"signal": "q"} if joint is None else {"signal": "q", "joint": joint}
+    return [e.subject.say("S15", "warn", words, remedy, gate=True, **place)]
 
 
 def _scaled(
@@ -228,49 +244,6 @@ def _scaled(
             if (fits <= _CONFIG.worse * rows).all() and bends:
                 found.append((left, joint, name))
     return (before, *min(found, key=lambda one: one[0])) if found else None
-
-
-@dataclass(frozen=True)
-class TorqueScale:
-    """The torque of `joint` (from 0) is `factor` times what the others' need."""
-
-    joint: int
-    factor: float
-    before: float  # residual
-    after: float  # the same where the torque is divided by the factor
-    # joints and factors that explain as much: of two torques only the ratio shows
-    others: tuple[tuple[int, float], ...] = ()
-
-
-def torque_scale(e: Evidence) -> TorqueScale | None:
-    """Return the joint and factor that leave least, where the log as it is leaves far more.
-
-    All torques come from one set of rigid parameters.
-    """
-    told = e.telling.tolist()
-    if len(told) < 2:
-        return None
-    rows = SharedRows.of(e.body, e.motion, told)
-    before = _rms(rows.left(np.ones(len(told))))
-    if before < _SCALE.bad:
-        return None
-    found = []
-    for place, joint in enumerate(told):
-        low, high = -np.log(_SCALE.most), np.log(_SCALE.most)
-        for _ in range(_FINER):  # ever finer grids
-            grid = np.linspace(low, high, _GRID)
-            factors = np.ones((_GRID, len(told)))
-            factors[:, place] = np.exp(grid)
-            best, at = min((_rms(rows.left(row)), k) for k, row in enumerate(factors))
-            low, high = grid[max(at - 1, 0)], grid[min(at + 1, _GRID - 1)]
-        found.append((best, float(factors[at, place]), joint))
-    after, factor, joint = min(found)
-    # the end of the search is no finding
-    inside = _SCALE.least < max(factor, 1.0 / factor) < _SCALE.most * (1.0 - 1e-9)
-    if not inside or after > _SCALE.better * before:
-        return None
-    near = [(other, by) for left, by, other in sorted(found) if left < _SCALE.as_good * after]
-    return TorqueScale(joint, factor, before, after, tuple(one for one in near if one[0] != joint))
 
 
 def _signs(e: Evidence) -> list[Check]:
@@ -317,60 +290,25 @@ def _negative(e: Evidence, joint: int) -> bool:
 
 
 def _sizes(e: Evidence) -> Findings:
-    """S15: the torque is as large as the described links need, or the other joints' torques.
-
-    Within what load and friction can make of it.
-    """
-    subject, known = e.subject, e.body.known_parameters()
-    slopes = {} if known is None else _slopes(e, known)
-    far = {j: s for j, s in slopes.items() if s > _CONFIG.ratio or 0 < s < 1 / _CONFIG.ratio}
-    told = [(j, s, f"tau of joint {j + 1} is {s:.3g} times") for j, s in far.items()]
-    need = "what the described links need"
-    if not told and (found := torque_scale(e)) is not None:
-        places = [f"tau of joint {found.joint + 1} is {found.factor:.3g} times"]
-        places += [f"tau of joint {joint + 1} {factor:.3g} times" for joint, factor in found.others]
-        need = "what the other joints' torques need"
-        need += ": only their ratio shows" if found.others else ""
-        need += f", residual {found.before:.2g} -> {found.after:.2g}"
-        told = [(found.joint, found.factor, ", or ".join(places))]
-    checks = []
-    for joint, factor, words in told:
+    """S15: the torque is as large as the described links need, but for a load and friction."""
+    subject, checks = e.subject, []
+    for joint, factor in e.far.items():
+        words = f"tau of joint {joint + 1} is {factor:.3g} times what the described links need"
         remedy = f"look for a gear ratio or torque constant of about {factor:.3g} or "
         remedy += f"{1 / factor:.3g} that was applied twice or not at all, or another unit of the "
         remedy += f"angles; tau of joint {joint + 1} divided by {factor:.3g} would fit"
-        words = f"{words} {need}"
-        checks.append(
-            subject.say("S15", "warn", words, signal="tau", joint=joint, gate=True, remedy=remedy)
-        )
+        checks.append(subject.say("S15", "warn", words, remedy, True, signal="tau", joint=joint))
     if checks:
         return checks
-    if known is None:
+    if e.body.known_parameters() is None:
         words = "the robot's description has no masses and inertias to compare with"
         return subject.cannot_tell("S15", words, signal="tau")
-    if not slopes:
+    if not e.slopes:
         words = "the described masses and inertias do not explain the torque of any joint, so that "
         words += "a wrong gear ratio or unit would not show"
         return subject.cannot_tell("S15", words, signal="tau")
-    seen = ", ".join(f"joint {j + 1}: {slope:.3g}" for j, slope in slopes.items())
+    seen = ", ".join(f"joint {j + 1}: {slope:.3g}" for j, slope in e.slopes.items())
     return subject.ok("S15", f"torque over that of the described links: {seen}", signal="tau")
-
-
-def _slopes(e: Evidence, known: Array) -> dict[int, float]:
-    """Return torque over that of the described links, of each joint that they explain."""
-    motion, slopes = e.motion, {}
-    expected = e.body.torque(motion.q, motion.dq, motion.ddq, known)
-    for j in e.telling.tolist():
-        tau = motion.tau[:, j]
-        columns = [motion.dq[:, j], motion.coulomb[:, j], np.ones(len(tau)), expected[:, j]]
-        fits = [np.linalg.lstsq(np.stack(columns[:k], axis=1), tau, rcond=None)[0] for k in (3, 4)]
-        without, left = (
-            np.linalg.norm(tau - np.stack(columns[: len(fit)], axis=1) @ fit) for fit in fits
-        )
-        # else the described links are not this arm's; they say nothing
-        size = np.linalg.norm(tau - tau.mean())
-        if left <= _CONFIG.ratio_residual * size and left <= 0.4 * without:
-            slopes[j] = float(fits[1][3])
-    return slopes
 
 
 def _clock(e: Evidence) -> Findings:
