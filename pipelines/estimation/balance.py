@@ -26,15 +26,7 @@ from pipelines.dynamics.body import Motion
 from pipelines.dynamics.energy import energy, work
 from pipelines.estimation.config import BalanceConfig
 from pipelines.estimation.estimate import Estimate
-from pipelines.estimation.least_squares import (
-    Block,
-    Flags,
-    Indices,
-    Statistics,
-    gather_growing,
-    solve,
-    split,
-)
+from pipelines.estimation.least_squares import Block, Flags, Indices, gather_growing, solve, split
 from pipelines.estimation.regression import LogEquations
 from pipelines.io.log import Array
 
@@ -87,24 +79,33 @@ def power_balance(found: Estimate) -> Balance | None:
     both[:-1, :-1] += found.robust.covariance[np.ix_(rigid, rigid)]
     difference[:-1] -= found.beta[rigid]
     apart, std = np.abs(difference) / np.sqrt(np.diag(both)), np.sqrt(np.diag(covariance))
-    chi_square, rank = _distance(difference, both)
+    # dᵀ V⁻¹ d over the directions that V knows
+    scale = np.sqrt(np.diag(both))
+    values, vectors = np.linalg.eigh(both / scale / scale[:, None])
+    keep = values > 1e-10 * values[-1]
+    turned = vectors[:, keep].T @ (difference / scale)
+    chi_square, rank = float(np.sum(np.square(turned) / values[keep])), int(keep.sum())
+    # the normal deviate as rare: χ²/k follows F(k, n), V known from n others; Paulson 1942,
+    # ((1 - 2/9n) F^⅓ - (1 - 2/9k)) / √(2/9n F^⅔ + 2/9k)
     free = len(groups) - rank
+    n, k = 2.0 / (9.0 * free), 2.0 / (9.0 * rank)
+    root = np.cbrt(chi_square * free / (len(groups) - 1) / rank)
+    deviate = float(((1.0 - n) * root - (1.0 - k)) / np.sqrt(n * root**2 + k))
     closure = _closure(logs, found.beta)
-    deviate = _deviate(chi_square * free / (len(groups) - 1), rank, free)
     agree = apart.max() < _CONFIG.alone and deviate < _CONFIG.together
     return Balance(
-        tuple(columns.names[k].name for k in rigid),
-        tuple(map(float, solution.beta[rigid])),
-        tuple(map(float, std[:-1])),
-        tuple(map(float, apart[:-1])),
-        float(solution.beta[-1]),
-        float(std[-1]),
-        chi_square,
-        rank,
-        deviate,
-        closure,
-        int(gram.counts.sum()),
-        bool(agree and closure < _CONFIG.closed),
+        names=tuple(columns.names[k].name for k in rigid),
+        value=tuple(solution.beta[rigid].tolist()),
+        std=tuple(std[:-1].tolist()),
+        apart=tuple(apart[:-1].tolist()),
+        delay=float(solution.beta[-1]),
+        delay_std=float(std[-1]),
+        chi_square=chi_square,
+        freedom=rank,
+        deviate=deviate,
+        closure=closure,
+        windows=int(gram.counts.sum()),
+        agree=bool(agree and closure < _CONFIG.closed),
     )
 
 
@@ -121,25 +122,6 @@ def _jackknife(groups: list[Statistics], beta: Array) -> Array:
     table = rest[:, :-1, :-1] / scale / scale[:, None] + 1e-12 * np.eye(len(scale))
     solved = np.linalg.solve(table, (rest[:, :-1, -1] / scale)[..., None])[..., 0] / scale
     return np.asarray((len(groups) - 1) / len(groups) * (solved - beta).T @ (solved - beta))
-
-
-def _distance(difference: Array, covariance: Array) -> tuple[float, int]:
-    """Return dᵀ V⁻¹ d over the directions that V knows, and how many they are."""
-    scale = np.sqrt(np.diag(covariance))
-    values, vectors = np.linalg.eigh(covariance / scale / scale[:, None])
-    keep = values > 1e-10 * values[-1]
-    turned = vectors[:, keep].T @ (difference / scale)
-    return float(np.sum(np.square(turned) / values[keep])), int(keep.sum())
-
-
-def _deviate(chi_square: float, freedom: int, rest: int) -> float:
-    """Return the normal deviate as rare as `chi_square`, the variance known from `rest` others.
-
-    χ²/k follows F(k, n) then; Paulson 1942:
-    ((1 - 2/9n) F^⅓ - (1 - 2/9k)) / √(2/9n F^⅔ + 2/9k).
-    """
-    n, k, root = 2.0 / (9.0 * rest), 2.0 / (9.0 * freedom), np.cbrt(chi_square / freedom)
-    return float(((1.0 - n) * root - (1.0 - k)) / np.sqrt(n * root**2 + k))
 
 
 def _closure(logs: Sequence[LogEquations], beta: Array) -> float:

@@ -12,7 +12,7 @@ that have not. A residual has no std of its own: it is judged by the scatter of 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -21,8 +21,6 @@ import numpy as np
 from pipelines.dynamics.parameter_names import quantity_of
 from pipelines.estimation.config import DriftConfig
 from pipelines.io.log import Array
-
-__all__ = ["DriftFigure", "RobotDrift", "Session", "drift_of", "from_others", "is_drift"]
 
 _CONFIG = DriftConfig()
 _MAD_TO_STD = 1.4826  # numerics: of a normal distribution (Rousseeuw and Croux 1993)
@@ -49,13 +47,13 @@ class DriftFigure:
     unit: str
     items: tuple[str, ...]
     value: tuple[float, ...]
-    std: tuple[float, ...] | None
     away: tuple[float, ...]  # [std] of each from the mean of those that have not moved
-    chi_square: float | None
-    freedom: int | None
-    probability: float | None  # of so large a χ² if nothing moved
     trend: float  # [std] from the first item to the latest
     moved: tuple[str, ...]  # the items beyond three std
+    std: tuple[float, ...] | None = None
+    chi_square: float | None = None
+    freedom: int | None = None
+    probability: float | None = None  # of so large a χ² if nothing moved
 
 
 @dataclass(frozen=True)
@@ -73,80 +71,63 @@ def drift_of(sessions: Iterable[Session]) -> tuple[RobotDrift, ...]:
     for session in sorted(sessions, key=lambda one: (one.recorded, one.name)):
         if session.figures or session.residuals:
             robots.setdefault(session.robot, []).append(session)
-    drifts = []
-    for robot, own in sorted(robots.items()):
-        if len(own) > 1:
-            figures = _series([(one.name, one.figures) for one in own])
-            residuals = _series([(one.name, one.residuals) for one in own])
-            drifts.append(RobotDrift(robot, figures, residuals))
-    return tuple(drifts)
+    return tuple(
+        RobotDrift(
+            robot,
+            _series([(one.name, one.figures) for one in own], _of_figure),
+            _series([(one.name, one.residuals) for one in own], _of_residual),
+        )
+        for robot, own in sorted(robots.items())
+        if len(own) > 1
+    )
 
 
-def _series(sessions: list[tuple[str, Mapping[str, Any]]]) -> tuple[DriftFigure, ...]:
+def _series(
+    sessions: Sequence[tuple[str, Mapping[str, tuple[Any, ...]]]],
+    judge: Callable[[str, list[tuple[Any, ...]]], dict[str, Any]],
+) -> tuple[DriftFigure, ...]:
     """Return every figure that two sessions have in the same unit."""
     found = []
     for name in dict.fromkeys(name for _, numbers in sessions for name in numbers):
-        items = tuple(item for item, numbers in sessions if name in numbers)
-        values = [numbers[name] for _, numbers in sessions if name in numbers]
-        if len(items) > 1 and len({unit for *_, unit in values}) == 1:
-            value = np.array([numbers[0] for numbers in values])
-            if isinstance(values[0][1], str):  # the unit: it has no std
-                found.append(_residual(name, values[0][-1], items, value))
-            else:
-                std = np.array([numbers[1] for numbers in values])
-                found.append(_figure(name, values[0][-1], items, value, std))
+        values = {item: numbers[name] for item, numbers in sessions if name in numbers}
+        units = {unit for *_, unit in values.values()}
+        if len(values) > 1 and len(units) == 1:
+            told = judge(name, list(values.values()))
+            far = zip(values, told["away"], strict=True)
+            moved = tuple(item for item, away in far if abs(away) > _CONFIG.limit)
+            value = tuple(float(one[0]) for one in values.values())
+            unit = units.pop()
+            found.append(DriftFigure(name, unit, tuple(values), value, moved=moved, **told))
     return tuple(found)
 
 
-def _figure(name: str, unit: str, items: tuple[str, ...], value: Array, std: Array) -> DriftFigure:
+def _of_figure(name: str, values: list[tuple[Any, ...]]) -> dict[str, Any]:
+    """Judge values by their own standard deviations."""
     from scipy.special import gammaincc
 
-    turned, weight, freedom = _on_one_turn(name, value, std), 1.0 / std**2, len(items) - 1
+    value, std = (np.array([one[k] for one in values]) for k in (0, 1))
+    turned, weight, freedom = _on_one_turn(name, value, std), 1.0 / std**2, len(value) - 1
     mean = np.sum(weight * turned) / np.sum(weight)
     chi_square = float(np.sum(weight * (turned - mean) ** 2))
-    probability = float(gammaincc(freedom / 2.0, chi_square / 2.0))
-    trend = float((turned[-1] - turned[0]) / np.hypot(std[-1], std[0]))
-    away = from_others(turned, std)
-    return DriftFigure(
-        name,
-        unit,
-        items,
-        tuple(value.tolist()),
-        tuple(std.tolist()),
-        tuple(away.tolist()),
-        chi_square,
-        freedom,
-        probability,
-        trend,
-        _moved(items, away),
-    )
+    return {
+        "std": tuple(std.tolist()),
+        "away": tuple(from_others(turned, std).tolist()),
+        "chi_square": chi_square,
+        "freedom": freedom,
+        "probability": float(gammaincc(freedom / 2.0, chi_square / 2.0)),
+        "trend": float((turned[-1] - turned[0]) / np.hypot(std[-1], std[0])),
+    }
 
 
-def _residual(name: str, unit: str, items: tuple[str, ...], value: Array) -> DriftFigure:
+def _of_residual(name: str, values: list[tuple[Any, ...]]) -> dict[str, Any]:
     """Judge by the median absolute deviation, where there are enough items."""
-    away, trend = np.zeros(len(value)), 0.0
+    value = np.array([one[0] for one in values])
     deviation = value - np.median(value)
     scatter = _MAD_TO_STD * float(np.median(np.abs(deviation)))
-    if len(value) >= _CONFIG.enough and scatter > 0.0:
-        away = deviation / scatter
-        trend = float(value[-1] - value[0]) / (math.sqrt(2.0) * scatter)
-    return DriftFigure(
-        name,
-        unit,
-        items,
-        tuple(value.tolist()),
-        None,
-        tuple(away.tolist()),
-        None,
-        None,
-        None,
-        trend,
-        _moved(items, away),
-    )
-
-
-def _moved(items: tuple[str, ...], away: Array) -> tuple[str, ...]:
-    return tuple(item for item, far in zip(items, away, strict=True) if abs(far) > _CONFIG.limit)
+    if len(value) < _CONFIG.enough or scatter == 0.0:
+        return {"away": (0.0,) * len(value), "trend": 0.0}
+    trend = float(value[-1] - value[0]) / (math.sqrt(2.0) * scatter)
+    return {"away": tuple((deviation / scatter).tolist()), "trend": trend}
 
 
 def _on_one_turn(name: str, value: Array, std: Array) -> Array:
@@ -189,14 +170,12 @@ def is_drift(drift: RobotDrift) -> bool:
     χ² shows many items that moved a little, the farthest item a single one among hundreds: both
     are tested, at levels for which all tests together keep the false alarm rate (Šidák 1967).
     """
-    figures, items = len(drift.figures), sum(len(one.items) for one in drift.figures)
+    tests = len(drift.figures), sum(len(one.items) for one in drift.figures)
+    level, level_of_items = (
+        -math.expm1(math.log1p(-_CONFIG.false_alarms) / (2 * max(1, count))) for count in tests
+    )
     for one in drift.figures:
         farthest = math.erfc(max(map(abs, one.away)) / math.sqrt(2.0))
-        if one.moved and ((one.probability or 0.0) < _level(figures) or farthest < _level(items)):
+        if one.moved and ((one.probability or 0.0) < level or farthest < level_of_items):
             return True
     return False
-
-
-def _level(tests: int) -> float:
-    """Return the level of each of two times `tests`."""
-    return -math.expm1(math.log1p(-_CONFIG.false_alarms) / (2 * max(1, tests)))
