@@ -13,7 +13,7 @@ where it follows from another. Residuals have no standard deviation: they are li
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +22,6 @@ from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.estimation.bootstrap import limit_of, standardised
 from pipelines.io.option import option
 from pipelines.io.results import read_result
-from pipelines.report.compared_results import called, less_findings, modelled
 from pipelines.report.comparison_report import (
     Answer,
     Comparison,
@@ -31,7 +30,14 @@ from pipelines.report.comparison_report import (
     comparison_report,
 )
 from pipelines.report.report import Report
-from pipelines.report.result_figures import fitted, numbers_of, residuals, robot_of
+from pipelines.report.result_figures import (
+    called,
+    fitted,
+    modelled,
+    numbers_of,
+    residuals,
+    robot_of,
+)
 from pipelines.stage import Inputs, Request, Stage
 
 _Figures = Mapping[str, tuple[float, float, str]]  # name -> value, std, unit
@@ -91,7 +97,7 @@ def compute(inputs: Inputs, settings: Settings) -> Comparison:
         answers = tuple(_answers(a.object, b.object))
         effects_a, effects_b = _only(a.object, b.object)
         both = modelled(a.object) & modelled(b.object)
-        first, second = (_independent(less_findings(one.object, both)) for one in (a, b))
+        first, second = (_independent(one.object, both) for one in (a, b))
     except (KeyError, TypeError, AttributeError) as problem:
         words = f"not what a result of {a.command} holds ({type(problem).__name__}: {problem})"
         raise InputRejected("S20", words, where=where, remedy="run the command again") from problem
@@ -124,9 +130,9 @@ def compute(inputs: Inputs, settings: Settings) -> Comparison:
     )
 
 
-def _independent(result: Mapping[str, Any]) -> _Figures:
+def _independent(result: Mapping[str, Any], held: Container[_Place]) -> _Figures:
     """Return figures that do not follow from others, as the order of a second harmonic does."""
-    figures = fitted(result)
+    figures = fitted(result, held)
     kinds = {name: quantity_of(name) for name in figures}
     derived = {name for name, kind in kinds.items() if kind is not None and kind.derived}
     return {name: figure for name, figure in figures.items() if name not in derived}

@@ -23,7 +23,7 @@ from pipelines.report import words
 from pipelines.report.config import REPORT
 from pipelines.report.diagnosis_figures import evidence_figures, finding_figures
 from pipelines.report.document import capital, document, sentence
-from pipelines.report.finding_words import beyond_chance, headlines, of_any_size, where
+from pipelines.report.finding_words import beyond_chance, headlines, how_much, of_any_size, where
 from pipelines.report.report import Report, Table, Tone, columns_table
 from pipelines.report.sections import checks_table, with_card
 from pipelines.report.style import format_number
@@ -52,7 +52,7 @@ def diagnosis_report(result: Result) -> Report:
         context = finding_context(number, one, result.residual_rms, units, left)
         context["folded"] = number > _OPEN or not (beyond_chance(one) or number == 1)
         context["command"] = command([one]) if find_effect(one.cause).clock != "log" else ""
-        context["every"] = command(lasting) if len(lasting) > 1 else ""
+        context["every"] = command(lasting) if len(lasting) > 1 and number == 1 else ""
         findings.append(context)
     said = " ".join(lines := headlines(result))
     causes = together(result.findings)
@@ -132,6 +132,7 @@ def finding_context(
     return {
         "one": one,
         "place": where(one),
+        "size": how_much(one),
         "texts": find_effect(one.cause).words,
         "share": share if share > REPORT.own_share * one.explained else None,
         "any_size": of_any_size(one),
