@@ -26,7 +26,15 @@ from pipelines.dynamics.body import Motion
 from pipelines.dynamics.energy import energy, work
 from pipelines.estimation.config import BalanceConfig
 from pipelines.estimation.estimate import Estimate
-from pipelines.estimation.least_squares import Block, Flags, Indices, gather_growing, solve, split
+from pipelines.estimation.least_squares import (
+    Block,
+    Flags,
+    Indices,
+    Statistics,
+    gather_growing,
+    solve,
+    split,
+)
 from pipelines.estimation.regression import LogEquations
 from pipelines.io.log import Array
 

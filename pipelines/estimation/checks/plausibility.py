@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +36,7 @@ from pipelines.estimation.config import PlausibilityConfig
 from pipelines.estimation.judgements import excited
 from pipelines.estimation.least_squares import Indices
 from pipelines.io.log import Array
-from pipelines.quality.subject import NotTested, Place, Subject, spread
+from pipelines.quality.subject import NotTested, Subject, spread
 from pipelines.simulation.commanded import against_command
 
 _CONFIG = PlausibilityConfig()
@@ -210,7 +211,7 @@ def _encoder_scale(e: Evidence) -> list[Check]:
         remedy = "correct the gear ratio, the direction or the counts per turn of this encoder; of "
         remedy += "a joint that bends nothing, a wrong torque constant looks alike"
     words += f", residual {before:.2g} -> {after:.2g}"
-    place: Place = {"signal": "q"} if joint is None else {"signal": "q", "joint": joint}
+    place: dict[str, Any] = {"signal": "q"} if joint is None else {"signal": "q", "joint": joint}
     return [e.subject.say("S15", "warn", words, remedy, gate=True, **place)]
 
 
