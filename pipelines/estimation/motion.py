@@ -245,6 +245,8 @@ def tuned_observers(seen: Measured, how: Reconstruction) -> Observers:
         low, high = float(f"{low:.3g}"), float(f"{_CONFIG.fastest * high:.3g}")
         if not all(low <= hz <= high for hz in how.bandwidth):
             words = "a bandwidth that filters nothing, or settles later than the log ends"
+            if not all(hz > 0.0 for hz in how.bandwidth):
+                words = "a bandwidth that is not positive"
             remedy = f"choose between {low} and {high} Hz, or leave it to be found from the data"
             raise UsageError("C02", words, "--bandwidth", remedy)
         variance = causal.noise_variance
