@@ -535,7 +535,7 @@ def laws_of(later: Later, end: State, place: int) -> list[tuple[Named, float]]:
 def _reformed(later: Later, state: State) -> tuple[Sequence[int], State]:
     """Return each cause by the law of it that predicts best now, and which causes are kept.
 
-    One whose numbers are impossible beside causes that were found after it is none.
+    A cause whose numbers are impossible beside causes found after it is dropped.
     """
     kept = list[int]()
     for place in range(len(state.model.effects)):

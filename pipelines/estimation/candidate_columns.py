@@ -41,7 +41,7 @@ class Family:
 
     @property
     def event(self) -> bool:
-        """Whether it happens once, in one log: its non-linear numbers belong to that."""
+        """True if it happens once, in one log, to which its non-linear numbers belong."""
         return self.shapes[0].clock == "log"
 
 

@@ -134,7 +134,7 @@ class ConsistencyConfig:
 
 @dataclass(frozen=True)
 class RegressionConfig:
-    """Which samples of a log make equations, and what a low-pass keeps of them."""
+    """Choice of the samples that make equations, and the band of their low-pass."""
 
     highest: float = 0.4  # of the rate: a low-pass from there on takes nothing away
     speed_share: float = 0.999  # of the power of the speed, below the highest frequency
@@ -200,7 +200,7 @@ class JudgeableConfig:
 
 @dataclass(frozen=True)
 class LinksConfig:
-    """What is assumed of links that nothing describes, and where links cease to exist."""
+    """Assumptions about links that nothing describes, and limits of links that can exist."""
 
     mass: float = 1.0  # [kg] torque shows no such mass
     radius: float = 0.1  # [m] of a ball

@@ -41,7 +41,7 @@ _SETTLED = 1e-9  # numerics: squared Newton decrement, where the search ends
 
 @dataclass(frozen=True)
 class Consistent:
-    """Whether links that could exist have the estimated parameters."""
+    """Test whether links that could exist have the estimated parameters."""
 
     consistent: bool
     distance: float  # [standard deviations] to the nearest parameters that could

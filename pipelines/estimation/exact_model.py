@@ -186,7 +186,7 @@ class Exact:
 
     @property
     def core(self) -> int:
-        """How many effects need the whole torque: all up to the last that does not just add."""
+        """Number of first effects up to the last one that does not just add its torque."""
         if self.misread:
             return len(self.effects)
         places = (k + 1 for k, one in enumerate(self.effects) if not adds(one.effect))
@@ -194,7 +194,7 @@ class Exact:
 
     @property
     def misread(self) -> bool:
-        """Whether an effect changes where or when all torque is seen, that of friction too."""
+        """True if an effect changes where or when all torque is seen, also friction."""
         return any(one.effect.acts_on != "load" for one in self.effects)
 
     def torque(self, data: Data, laid: Sequence[Array] | None = None) -> Array:

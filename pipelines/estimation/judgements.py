@@ -18,8 +18,8 @@ Friction takes power, so a viscous coefficient below zero is no friction: the to
 sign, was compensated for friction, is late behind the motion, or the model lacks a law of friction
 whose torque falls with speed. It is reported where it is significant by the standard deviation that
 allows for autocorrelation, where the logs determine it, and where it stays so with a second Coulomb
-law of the widest change of sign: at speeds within that width, viscous friction only mends the shape
-of the change.
+law of the widest change of sign: at speeds within that width, viscous friction only corrects the
+shape of the change.
 """
 
 from __future__ import annotations

@@ -93,7 +93,7 @@ def split(equations: Iterable[Block], samples: int) -> Iterator[Block]:
 
 @dataclass(frozen=True, eq=False)
 class Statistics:
-    """What remains of equations; of two streams it adds up. The last column is that of y."""
+    """Sufficient statistics of equations; those of two streams add. The last column is y."""
 
     table: Array  # (channels, k + 1, k + 1) [A y]ᵀ[A y] of each channel, or its R
     counts: Indices  # (channels,) equations

@@ -55,14 +55,14 @@ _DRAWS = 3  # numerics: of the noise of positions: their mean power is known to 
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """What differs from period to period: nothing that repeats is in it. Arrays per joint."""
+    """Noise as the difference between periods, without anything that repeats. Arrays per joint."""
 
     periods: int  # compared
     left_out: tuple[int, ...]  # periods that differ from the others, counted from 1
     position: Array  # [rad] standard deviation of one sample of one period
     torque: Array  # [N m]
     cutoff_hz: float | None  # of the low-pass of equations; None: none
-    position_low_pass: Array  # [rad] what the low-pass leaves of it
+    position_low_pass: Array  # [rad] the same behind the low-pass
     torque_low_pass: Array  # [N m]
     unlike: str  # why the periods are not averaged, in words; empty where they are
 
@@ -229,7 +229,7 @@ def averaged(
 
 @dataclass(frozen=True)
 class PeriodicLog:
-    """One periodic log: its noise, and what the estimate leaves of its torque. Per joint."""
+    """Noise of one periodic log, and the residual torque of the estimate. Arrays per joint."""
 
     log: str
     role: str
@@ -239,7 +239,7 @@ class PeriodicLog:
     left_out: tuple[int, ...]  # periods that differ from the others, counted from 1
     position: Array  # [rad] standard deviation of one sample of one period
     torque: Array  # [N m]
-    torque_low_pass: Array  # [N m] what the low-pass over equations leaves of it
+    torque_low_pass: Array  # [N m] the same behind the low-pass of equations
     motion: Array  # [N m] what the noise of positions does to the model's torque, in the mean
     noise_floor: Array  # [N m] noise in the mean period: torque's over √ their number, and motion's
     residual: Array  # [N m] rms that the estimate leaves in the mean period; else in every sample

@@ -200,7 +200,7 @@ class Columns:
 
     @cached_property
     def _acting(self) -> list[Indices]:
-        """Which columns of the body act on each joint: of an arm of any kind, at random states."""
+        """Return the columns of the body that act on each joint, found at random states."""
         if isinstance(self.body, RRR):
             return [np.array(columns, dtype=np.intp) for columns in ACTING]
         states = np.random.default_rng(_SEED).uniform(-3.0, 3.0, (3, 16, self.body.robot.n_joints))
@@ -210,7 +210,7 @@ class Columns:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Which samples of the mended log make equations."""
+    """The samples of the repaired log that make equations."""
 
     out: Flags  # (samples,) none: spoilt, vague, or so near to it that the low-pass spreads it here
     slow: Flags  # (samples, joints) none of this joint: too slow, or near torque that may be cut
@@ -317,7 +317,7 @@ class LogEquations:
         return np.asarray(self.found.good.kept[np.concatenate(every)])
 
     def _moments(self, run: slice, first: int, last: int) -> Indices:
-        """Return the samples first … last - 1 of the mended log that make equations of any joint.
+        """Return the samples first … last - 1 of the repaired log that make equations of any joint.
 
         Of a held command the first and the last of a run have no neighbour to be averaged with.
         """
@@ -351,13 +351,13 @@ class LogEquations:
 
     @cached_property
     def _unknown(self) -> Flags:
-        """(samples, joints) of the mended log: no motion, or a vague one."""
+        """(samples, joints) of the repaired log: no motion, or a vague one."""
         kept, motion = self.found.good.kept, self.found.motion
         finite = np.isfinite(motion.q + motion.dq + motion.ddq)[kept]
         return np.asarray(~finite | self.found.vague[kept])
 
     def stretch(self, wide: slice) -> tuple[Motion, Array]:
-        """Return motion and torque at samples of the mended log, straight lines over what is bad.
+        """Return motion and torque at samples of the repaired log, straight lines over what is bad.
 
         Where the acceleration is vague the position need not be: friction with a memory starts from
         where the joint was.

@@ -130,7 +130,7 @@ def tune(
     marked missing (NaN).
 
     Raises:
-        UsageError: C02, an order or a resolution that is none.
+        UsageError: C02, an order or a resolution out of bounds.
         InputRejected: T04, no stretch without gaps is long enough.
     """
     if order not in ORDERS:

@@ -170,6 +170,7 @@ def judged(task: Task, design: Design, apart: Apart | None, seed: int) -> Result
 
 
 def _turning(task: Task, trajectory: Trajectory) -> tuple[int, ...]:
+    """Return the joints, from 1, that move over more than a turn."""
     q = trajectory.sampled(task.sample_time)[1][0]
     pairs = enumerate(zip(task.robot.joints, np.ptp(q, axis=1), strict=True), 1)
     return tuple(j for j, (joint, way) in pairs if joint.revolute and way > 2.0 * np.pi)

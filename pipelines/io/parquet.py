@@ -196,18 +196,6 @@ def csv_cell(text: str) -> str:
     return '"' + safe.replace('"', '""') + '"'
 
 
-def write_table(path: Path, columns: Mapping[str, Array], units: Mapping[str, str]) -> None:
-    """Write named columns with their units as Parquet, page checksums included."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    fields = [
-        pa.field(name, pa.float64(), metadata={"units": units.get(name, "1")}) for name in columns
-    ]
-    table = pa.table([pa.array(values) for values in columns.values()], schema=pa.schema(fields))
-    write_file(path, lambda draft: pq.write_table(table, draft, **_TABLE))
-
-
 def write_rows(path: Path, rows: Sequence[Mapping[str, object]], kinds: Mapping[str, str]) -> None:
     """Write rows of named cells as Parquet; `kinds`: column -> type of pandas."""
     import pandas as pd
