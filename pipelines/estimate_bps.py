@@ -15,7 +15,6 @@ from pathlib import Path
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.parameter import Uncertainty
 from pipelines.errors import Check, NothingMatched, UsageError
-from pipelines.estimation.balance import power_balance
 from pipelines.estimation.checks.gates import examined
 from pipelines.estimation.consistency import consistency
 from pipelines.estimation.estimate import (
@@ -211,7 +210,6 @@ def _result(
         friction_of=(model or "fit-friction") if given else "",
         physically_consistent=None if checked is None else checked.consistent,
         consistency=checked,
-        balance=power_balance(found),
         unresolved=found.unresolved.told(columns_in_words(names)),
         not_separated=not_separated(found.solution, found.std, names),
         convergence_samples=growth.samples,

@@ -6,29 +6,20 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class TuningConfig:
-    """How observer and smoother are tuned to samples."""
+class MotionConfig:
+    """Numbers of the reconstruction of motion."""
 
+    # how observer and smoother are tuned to samples
     window: int = 32768  # samples a channel is tuned on: the liveliest stretch of this length
     still: int = 64  # samples: as long with values within 2.5 encoder steps is standing still
     noisier: float = 2.0  # times Δθ²/12: noise above this is taken instead of the resolution
     noise_cap: float = 1e8  # times Δθ²/12: no more than this is ever taken
-
-
-@dataclass(frozen=True)
-class GridConfig:
-    """When a clock has one grid, and how much of it may be missing."""
-
+    # when a clock has one grid, and how much of it may be missing
     long: int = 4096  # missing samples: of more, only the first are predicted
     predicted: int = 1024  # samples: those
     bridged: int = 10  # missing samples: after more a new grid begins
     crowded: float = 0.05  # of all samples: more on a place with another is no clock
-
-
-@dataclass(frozen=True)
-class ClockConfig:
-    """When a clock is uneven, and how its instants are estimated."""
-
+    # when a clock is uneven, and how its instants are estimated
     even: float = 1e-3  # of a sample time, rms of the intervals: 1e-6 rad at 1 rad/s and 1 kHz
     merged: float = 0.05  # of the samples that lie closer than a quarter step: no clock
     smooth_hz: float = 40.0  # above the motion of an arm: what a local polynomial leaves is noise
@@ -38,21 +29,32 @@ class ClockConfig:
     around: int = 16  # samples before and after a long interval that tell whether one is lost
     passes: int = 3  # of the weights: they are known to a per cent then
     closest: float = 0.25  # of a step: nearer samples are replaced by their mean
+    # limits of reconstructed motion, and of what may be asked for
+    finest: float = 1e-6  # [rad] where no step is described or seen: far below any encoder
+    forgotten: float = 7.0  # time constants after which a start is forgotten to about 1/1000
+    latest: int = 32768  # samples by which an observer must have forgotten its start
+    fastest: float = 0.4  # of the rate, the highest bandwidth
+    settle: float = 4.0  # periods of the bandwidth, after which an observer has forgotten its start
+    lead: int = 2  # missing samples at the very start that are predicted from what comes after
+    vague: float = 2.0  # times the usual standard deviation of the acceleration
+    beyond: float = 5.0  # usual deviations: no bound below it, however still a joint stands
+    # when reconstructed motion agrees with the measured one, and what figures show
+    alarm: float = 5e-4  # [rad] of the position: Kostić et al. 2004, Fig. 10(a), stays below it
+    slight: float = 0.2  # rms autocorrelation that changes a variance by less than a tenth
+    white: float = 3.0  # standard deviations
+    buckets: int = 400  # of an envelope
+    longest: int = 131072  # samples that a spectrum or a test of whiteness looks at
 
 
 @dataclass(frozen=True)
 class PeriodConfig:
-    """When periods are alike, and when the first begins unlike the others."""
+    """When periods are alike and may be averaged."""
 
+    # when periods are alike, and when the first begins unlike the others
     on_sample: float = 1e-3  # of a sample: nearer than this, a phase lies on a sample
     outlier: float = 3.0  # times the usual deviation of a period from the middle one
     start: float = 4.0  # times the usual power of the deviation in the first tenth of a period
-
-
-@dataclass(frozen=True)
-class MeanPeriodConfig:
-    """When the periods of a log may be averaged."""
-
+    # when the periods of a log may be averaged
     margin: float = 2.0  # [s] of copies on either side, at least: one period or several
     sparse: float = 2.0  # times the samples: a clock with more empty places is not folded
     alike_motion: float = 0.01  # of the motion: the curvature of the regressor leaves 1e-4 of it
@@ -62,55 +64,64 @@ class MeanPeriodConfig:
 
 
 @dataclass(frozen=True)
-class ReconstructionConfig:
-    """Limits of reconstructed motion, and of what may be asked for."""
+class FitConfig:
+    """Numbers of rows, fits and friction laws."""
 
-    finest: float = 1e-6  # [rad] where no step is described or seen: far below any encoder
-    forgotten: float = 7.0  # time constants after which a start is forgotten to about 1/1000
-    latest: int = 32768  # samples by which an observer must have forgotten its start
-    fastest: float = 0.4  # of the rate, the highest bandwidth
-    settle: float = 4.0  # periods of the bandwidth, after which an observer has forgotten its start
-    lead: int = 2  # missing samples at the very start that are predicted from what comes after
-    vague: float = 2.0  # times the usual standard deviation of the acceleration
-    beyond: float = 5.0  # usual deviations: no bound below it, however still a joint stands
+    # choice of the samples that make equations, and the band of their low-pass
+    highest: float = 0.4  # of the rate: a low-pass from there on takes nothing away
+    speed_share: float = 0.999  # of the power of the speed, below the highest frequency
+    dry_share: float = 0.99  # of the power of dry friction: of a square wave 40 harmonics
+    reversal: float = 0.01  # of its largest speed: where a joint is slower, it reverses
+    stiff_hz: float = 10.0  # [Hz] arms do not bend below (Kostić et al. 2004, Section IV.C.3)
+    short: float = 0.5  # of the longest stretch without a gap
+    touched: float = 1.0  # periods of the cut-off over which one bad sample spreads, either side
+    lost: float = 3.0  # times the usual deviation of a position, beyond which it is not known
+    memory: float = 0.05  # [s] of the smoother, and of a rest, where no low-pass has a longer one
+    matters: float = 1e-4  # of the joint's largest torque within its limit
+    few: float = 0.1  # of a joint's rows: where no more would be left, all stay
+    # when logs hold enough for a fit
+    fewest: int = 200  # equations of a fit: ten a parameter of the RRR arm with friction
+    fewest_of_joint: int = 20  # equations
+    mostly: float = 0.01  # of the samples saturated: that is why none is left
+    parts: int = 40  # of the convergence series
+    settled: float = (
+        4.0  # standard deviations between halves of the samples: no chance among twenty
+    )
+    # limits of a rest, and of leaving it out
+    resting: float = 0.2  # hypot of speed and acceleration over their rms; .1 to .3 are alike
+    more: float = 2.0  # times the residual of the motion, that a rest held by friction leaves
+    # when a joint is held or stands, and how wide a smoother of reversals is
+    held: float = 0.02  # of its largest speed in all logs, below which a joint is held in a log
+    # Times the bandwidth of a smoother. Over logs of the bench coupled transmission leaves 2.5
+    # floors at 1, 1.2 at 1.8, 1.0 at 2.3, and hardly less at 3.2.
+    wider: float = 2.3
+    # when the terms of a friction law are distinguished
+    sure: float = 2.0  # standard deviations
+    vague: float = 1.0  # of the logarithm of a sharpness: it may be three times as large
+    rough: float = 0.3  # of the same, from which on no deviation is given
+    worth: float = 0.99  # of the squared error that a plainer law leaves: more is no gain
+    much: float = 0.85  # of the same; at 21 joints with one sigmoid none left less than .89
+    long: float = 0.25  # times the equations of a joint in later logs
+    fast: float = 0.5  # times its speed in them, with which earlier logs judge its friction
+    # when two rows are of one state, and a residual is noise
+    alike: tuple[float, float, float] = (1e-3, 1e-2, 0.1)  # [rad, rad/s, rad/s²] less is noise
+    near: float = 0.1  # of the standard deviation of each coordinate: rows of one state
+    apart: float = 1.0  # [s] in a log, at least: after less, what wanders is where it was
+    above: float = 1.6  # times the noise between rows of one state: a smaller residual is noise
 
 
 @dataclass(frozen=True)
-class DriftConfig:
-    """When a figure of one session has moved against those of the others."""
+class UncertaintyConfig:
+    """Numbers of covariance, identifiability and physical consistency."""
 
-    limit: float = 3.0  # [std] beyond which a value has moved; by chance 1 of 370 is
-    enough: int = 5  # items, to judge a residual by its scatter
-    false_alarms: float = 0.01  # share of robots without drift that are reported with one
-
-
-@dataclass(frozen=True)
-class ResultConfig:
-    """When reconstructed motion agrees with the measured one, and what figures show."""
-
-    alarm: float = 5e-4  # [rad] of the position: Kostić et al. 2004, Fig. 10(a), stays below it
-    slight: float = 0.2  # rms autocorrelation that changes a variance by less than a tenth
-    white: float = 3.0  # standard deviations
-    buckets: int = 400  # of an envelope
-    longest: int = 131072  # samples that a spectrum or a test of whiteness looks at
-
-
-@dataclass(frozen=True)
-class CovarianceConfig:
-    """How the noise of a residual is described."""
-
+    # how the noise of a residual is described
     order: int = 24  # of the autoregressions at most
     bins: int = 40  # independent frequencies in a band: its power is then known to 16 %
     most_taken: float = 0.75  # of a band's noise, by the parameters: beyond, too little is left
     cross: float = 5.0  # standard deviations of a correlation between channels that is no chance
     coherent: float = 14.0  # over the number of frequencies: once in a million bands by chance
     lags: int = 20  # samples apart, at which it is looked for
-
-
-@dataclass(frozen=True)
-class IdentifiabilityConfig:
-    """When parameters are determined, visible and separated."""
-
+    # when parameters are determined, visible and separated
     whole: float = 3.0  # standard deviations of a lost direction that reach all that was measured
     sure: float = 3.0  # standard deviations that a value must stand from zero
     small: float = 0.05  # of the typical size: zero to within this is known to be nearly nothing
@@ -121,66 +132,18 @@ class IdentifiabilityConfig:
     share: float = 0.5  # of a parameter's variance that comes from such dependencies
     linked: float = 0.3  # of its variance, with which it belongs to one that competes with others
     torque: float = 0.5  # std of its torque over the residual: 2 std are then as wide
-
-
-@dataclass(frozen=True)
-class ConsistencyConfig:
-    """When bodies that could exist explain an estimate."""
-
+    # when bodies that could exist explain an estimate
     limit: float = 3.0  # standard deviations within which noise explains the distance
     gap: float = 1e-4  # of ½ distance², absolute and relative, where the search stops
     inside: float = 1.1  # times the least distance, at which bodies lie inside of what exists
-
-
-@dataclass(frozen=True)
-class RegressionConfig:
-    """Choice of the samples that make equations, and the band of their low-pass."""
-
-    highest: float = 0.4  # of the rate: a low-pass from there on takes nothing away
-    speed_share: float = 0.999  # of the power of the speed, below the highest frequency
-    dry_share: float = 0.99  # of the power of dry friction: of a square wave 40 harmonics
-    reversal: float = 0.01  # of its largest speed: where a joint is slower, it reverses
-    stiff_hz: float = 10.0  # [Hz] arms do not bend below (Kostić et al. 2004, Section IV.C.3)
-    short: float = 0.5  # of the longest stretch without a gap
-    touched: float = 1.0  # periods of the cut-off over which one bad sample spreads, either side
-    lost: float = 3.0  # times the usual deviation of a position, beyond which it is not known
-    memory: float = 0.05  # [s] of the smoother, where no low-pass has a longer one
-    matters: float = 1e-4  # of the joint's largest torque within its limit
-    few: float = 0.1  # of a joint's rows: where no more would be left, all stay
-
-
-@dataclass(frozen=True)
-class EstimateConfig:
-    """When logs hold enough for a fit."""
-
-    fewest: int = 200  # equations of a fit: ten a parameter of the RRR arm with friction
-    fewest_of_joint: int = 20  # equations
-    mostly: float = 0.01  # of the samples saturated: that is why none is left
-    parts: int = 40  # of the convergence series
-    highest: float = RegressionConfig.highest  # of the rate, of a cut-off
-
-
-@dataclass(frozen=True)
-class BalanceConfig:
-    """Windows of the balance of power, and when it agrees with an estimate."""
-
-    window: float = 0.02  # [s] between balances: long against noise, short against the motion
-    groups: int = 40  # at least, left out in turn
-    per_parameter: int = 3  # groups a parameter that are aimed at
-    fewest: float = 1.5  # groups a parameter, enough to tell chance by
-    closed: float = 2e-3  # of the energy: a smoother leaves 1e-5, differences 1e-4, observers 1e-2
-    alone: float = 4.0  # standard deviations of one difference: no chance among twenty
-    together: float = 3.0  # normal deviate of all differences together: once in 700
-
-
-@dataclass(frozen=True)
-class RestConfig:
-    """Limits of a rest, and of leaving it out."""
-
-    still: float = 0.2  # hypot of speed and acceleration over their rms; .1 to .3 are alike
-    memory: float = 0.05  # [s] a rest lasts at least, where no low-pass has a longer period
-    more: float = 2.0  # times the residual of the motion, that a rest held by friction leaves
-    least: int = 20  # equations of a joint that have to remain
+    # assumptions about links that nothing describes, and limits of links that can exist
+    mass: float = 1.0  # [kg] torque shows no such mass
+    radius: float = 0.1  # [m] of a ball
+    thin: float = 1e-3  # of a ball's second moment, that a point or a rod is given
+    relative: float = 1e-3  # std of a base parameter without one, of the largest
+    # when a figure of one session has moved against those of the others, by more than `limit`
+    enough: int = 5  # items, to judge a residual by its scatter
+    false_alarms: float = 0.01  # share of robots without drift that are reported with one
 
 
 @dataclass(frozen=True)
@@ -196,49 +159,6 @@ class JudgeableConfig:
     least_std: float = 3.0
     least_travel: float = 1e-3  # [rad or m] a joint that moves less is held
     steps: float = 50.0  # encoder steps, the same
-
-
-@dataclass(frozen=True)
-class LinksConfig:
-    """Assumptions about links that nothing describes, and limits of links that can exist."""
-
-    mass: float = 1.0  # [kg] torque shows no such mass
-    radius: float = 0.1  # [m] of a ball
-    thin: float = 1e-3  # of a ball's second moment, that a point or a rod is given
-    relative: float = 1e-3  # std of a base parameter without one, of the largest
-
-
-@dataclass(frozen=True)
-class PreparationConfig:
-    """When a joint is held or stands, and how wide a smoother of reversals is."""
-
-    held: float = 0.02  # of its largest speed in all logs, below which a joint is held in a log
-    # Times the bandwidth of a smoother. Over logs of the bench coupled transmission leaves 2.5
-    # floors at 1, 1.2 at 1.8, 1.0 at 2.3, and hardly less at 3.2.
-    wider: float = 2.3
-
-
-@dataclass(frozen=True)
-class TermsConfig:
-    """When the terms of a friction law are distinguished."""
-
-    sure: float = 2.0  # standard deviations
-    vague: float = 1.0  # of the logarithm of a sharpness: it may be three times as large
-    rough: float = 0.3  # of the same, from which on no deviation is given
-    worth: float = 0.99  # of the squared error that a plainer law leaves: more is no gain
-    much: float = 0.85  # of the same; at 21 joints with one sigmoid none left less than .89
-    long: float = 0.25  # times the equations of a joint in later logs
-    fast: float = 0.5  # times its speed in them, with which earlier logs judge its friction
-
-
-@dataclass(frozen=True)
-class RepeatedConfig:
-    """When two rows are of one state, and a residual is noise."""
-
-    still: tuple[float, float, float] = (1e-3, 1e-2, 0.1)  # [rad, rad/s, rad/s²] less is noise
-    near: float = 0.1  # of the standard deviation of each coordinate: rows of one state
-    apart: float = 1.0  # [s] in a log, at least: after less, what wanders is where it was
-    above: float = 1.6  # times the noise between rows of one state: a smaller residual is noise
 
 
 @dataclass(frozen=True)
@@ -272,7 +192,6 @@ class PlausibilityConfig:
     most_rows: int = 2000
     held: float = 0.1  # of the travel of the joint that moves most: less is held
     # columns and scales
-    bad: float = 0.15  # residual of the log as it is, from which another order is tried
     good: float = 0.3  # residual of another order or scale that explains
     much_better: float = 0.35  # of the residual before
     scale_bad: float = 0.02  # a wrong scale can hide well, but the right one then is far better

@@ -26,11 +26,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.dynamics.body import RigidBody
-from pipelines.estimation.config import ConsistencyConfig
+from pipelines.estimation.config import UncertaintyConfig
 from pipelines.estimation.estimate import Estimate
 from pipelines.io.log import Array
 
-_CONFIG = ConsistencyConfig()
+_CONFIG = UncertaintyConfig()
 _STEPS = 400  # numerics: of Newton's method at most; fifty are usual
 _SHRINK = 30.0  # numerics: of ε between two centres
 _CENTRED = 0.05  # numerics: squared Newton decrement

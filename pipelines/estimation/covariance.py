@@ -26,14 +26,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.estimation.config import CovarianceConfig
+from pipelines.estimation.config import UncertaintyConfig
 from pipelines.estimation.filters import fast_length
 from pipelines.estimation.least_squares import Block, Solution
 from pipelines.io.log import Array
 
 Complex = npt.NDArray[np.complex128]
 
-_CONFIG = CovarianceConfig()
+_CONFIG = UncertaintyConfig()
 _PADDING = 8  # numerics: an eighth of a block of zeros, so that its end is far from its beginning
 _ALIKE = 1e-12  # numerics: channels may be exact multiples of one another
 

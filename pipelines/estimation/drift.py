@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from pipelines.dynamics.parameter_names import quantity_of
-from pipelines.estimation.config import DriftConfig
+from pipelines.estimation.config import UncertaintyConfig
 from pipelines.io.log import Array
 
-_CONFIG = DriftConfig()
+_CONFIG = UncertaintyConfig()
 _MAD_TO_STD = 1.4826  # numerics: of a normal distribution (Rousseeuw and Croux 1993)
 
 

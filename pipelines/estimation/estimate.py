@@ -19,7 +19,7 @@ import numpy as np
 
 from pipelines.dynamics.body import Motion
 from pipelines.errors import InputRejected, UsageError
-from pipelines.estimation.config import EstimateConfig
+from pipelines.estimation.config import FitConfig
 from pipelines.estimation.covariance import Robust, robust_covariance
 from pipelines.estimation.filters import KEEP
 from pipelines.estimation.identifiability import (
@@ -57,7 +57,7 @@ from pipelines.io.log import Array, ExperimentLog
 
 __all__ = ["Motions"]
 
-_CONFIG = EstimateConfig()
+_CONFIG = FitConfig()
 _KEPT = 4 << 20  # numerics: [B] of conditioned equations; longer ones are made at every pass
 
 

@@ -7,117 +7,45 @@ are the reference of the tests; importing them takes longer than a fit.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
-from math import factorial
+from math import ceil, factorial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.errors import InputRejected, UsageError
-from pipelines.estimation.chain import Array, Complex, impulse_toeplitz
+from pipelines.errors import InputRejected
+from pipelines.io.log import Array
 
 AMPLE = 24.0  # numerics: samples a period of the cut-off at which columns are computed
 COARSE = 12.0  # numerics: those of a search: a change of sign then shows in hundredths of the noise
 KEEP = 4.0  # numerics: samples left per period of the cut-off: 2 × 6 dB per octave at Nyquist
-_BLOCK = 48  # numerics: samples
+PAD = 4.0  # numerics: periods of the cut-off by which a stretch is continued at either end
 _PARTS = 4  # numerics: steps shorter than so many samples may be fractions, denominators up to it
 
 
-@dataclass(frozen=True)
-class LowPass:
-    """A Butterworth low-pass as a sum of its modes: H(z) = direct + Σ residue / (z - pole)."""
+def zero_phase(x: Array, cutoff_hz: float, rate: float) -> Array:
+    """Filter along axis 0 forward and backward by Butterworth's low-pass of order 4.
 
-    order: int
-    poles: Complex  # upper half plane and real axis only
-    residues: Complex  # doubled for the pairs, so that the real part is the sum of both
-    direct: float
-
-    @property
-    def padding(self) -> int:
-        """Samples that either end is extended by: as filtfilt does (Gustafsson 1996, sec. I)."""
-        return 3 * (self.order + 1)
-
-
-def design_low_pass(cutoff_hz: float, rate: float, order: int = 4) -> LowPass:
-    """Return Butterworth's (1930), by the bilinear transform with prewarping.
-
-    -3 dB at `cutoff_hz` for one pass, -6 dB for both.
-    """
-    if not 0.0 < cutoff_hz < rate / 2.0:
-        remedy = f"choose one between 0 and half the rate, {rate / 2:g} Hz"
-        raise UsageError("C02", f"cut-off {cutoff_hz:g} Hz of a low-pass", remedy=remedy)
-    if not 1 <= order <= 8:
-        remedy = "choose an order from 1 to 8"
-        raise UsageError("C02", f"a low-pass of order {order}", remedy=remedy)
-    # s = 2 (z - 1) / (z + 1), analogue poles on a circle of the warped cut-off
-    angle = 0.5 * np.pi * (1.0 + (2.0 * np.arange(order) + 1.0) / order)
-    analogue = 2.0 * np.tan(np.pi * cutoff_hz / rate) * np.exp(1j * angle)
-    poles = (2.0 + analogue) / (2.0 - analogue)
-    direct = np.prod(-analogue / (2.0 - analogue)).real
-    differences = poles[:, None] - poles + np.eye(order)
-    residues = direct * (poles + 1.0) ** order / np.prod(differences, axis=1)
-    single = np.abs(analogue.imag) <= 1e-9 * np.abs(analogue)
-    upper = single | (analogue.imag > 0.0)
-    doubled = np.where(single, 1.0, 2.0)[upper] * residues[upper]
-    return LowPass(order, poles[upper], doubled, float(direct))
-
-
-def zero_phase(x: Array, low_pass: LowPass) -> Array:
-    """Filter forward and backward along axis 0, as scipy.signal.sosfiltfilt.
-
-    Odd extension at the ends and a steady start.
+    In the frequency domain, the ends continued by odd extensions of four periods.
 
     Raises:
-        InputRejected: T08, too few samples; D01, missing ones.
+        InputRejected: T08, fewer than two samples; D01, missing ones.
     """
-    pad = low_pass.padding
-    if len(x) <= pad:
-        words = f"{len(x)} samples are too few for a low-pass of order {low_pass.order}"
-        raise InputRejected("T08", words, remedy=f"record more than {pad} samples")
-    flat = np.asarray(x, dtype=np.float64).reshape(len(x), -1)
-    if not np.isfinite(flat[[0, -1]]).all() or not np.isfinite(flat.sum()):
+    if len(x) < 2:
+        raise InputRejected("T08", f"{len(x)} samples to filter", remedy="record longer")
+    if not np.isfinite(x.sum()):
         remedy = "cut the log at its gaps, or reconstruct the missing samples first"
         raise InputRejected("D01", "missing samples in a signal that is filtered", remedy=remedy)
-    before, behind = 2.0 * flat[0] - flat[pad:0:-1], 2.0 * flat[-1] - flat[-2 : -pad - 2 : -1]
-    once = _one_pass(np.concatenate([before, flat, behind]), low_pass)
-    back = _one_pass(once[::-1], low_pass)[::-1]
-    return np.ascontiguousarray(back[pad:-pad]).reshape(x.shape)
-
-
-def _one_pass(u: Array, low_pass: LowPass) -> Array:
-    """Filter `u` (samples, columns), started as if the first value had always been there."""
-    samples, columns = u.shape
-    count, m, whole = -(-samples // _BLOCK), len(low_pass.poles), samples // _BLOCK
-    power = low_pass.poles ** np.arange(_BLOCK + 1)[:, None]  # (B + 1, m)
-    pulse = (power[: _BLOCK - 1] @ low_pass.residues).real
-    free = power[:_BLOCK] * low_pass.residues
-    # state of a mode as real and imaginary part, next to the inputs of the block: one real product
-    inside = impulse_toeplitz(np.append(low_pass.direct, pulse)).T
-    kernel = np.concatenate([inside, free.real, -free.imag], axis=1)
-    blocks = np.zeros((count, _BLOCK + 2 * m, columns))
-    blocks[:whole, :_BLOCK] = u[: whole * _BLOCK].reshape(whole, _BLOCK, columns)
-    if whole < count:
-        blocks[-1, : samples - whole * _BLOCK] = u[whole * _BLOCK :]
-    leave = power[_BLOCK - 1 :: -1].T
-    steady = (1.0 / (1.0 - low_pass.poles))[:, None] * u[0]
-    drive = np.empty((count, 2 * m, columns))
-    drive[0] = np.concatenate([steady.real, steady.imag])
-    np.matmul(np.concatenate([leave.real, leave.imag]), blocks[:-1, :_BLOCK], out=drive[1:])
-    blocks[:, _BLOCK:] = _carry(power[_BLOCK], drive)
-    return np.asarray((kernel @ blocks).reshape(count * _BLOCK, columns)[:samples])
-
-
-def _carry(across: Complex, drive: Array) -> Array:
-    """x_{b+1} = across x_b + d_{b+1} of modes as real and imaginary parts, as `chain.scan`."""
-    shift = 1
-    while shift < len(drive) and np.abs(across).max() > 1e-22:
-        real, imag = np.diag(across.real), np.diag(across.imag)
-        drive[shift:] += np.block([[real, -imag], [imag, real]]) @ drive[:-shift]
-        across, shift = across * across, 2 * shift
-    return drive
+    pad = min(len(x) - 1, ceil(PAD * rate / cutoff_hz))
+    before, behind = 2.0 * x[0] - x[pad:0:-1], 2.0 * x[-1] - x[-2 : -pad - 2 : -1]
+    wide = np.concatenate([before, x, behind])
+    middle, size = 0.5 * (wide[0] + wide[-1]), fast_length(len(wide))
+    response = passed_both_ways(np.fft.rfftfreq(size, 1.0 / rate), cutoff_hz, rate)
+    bins = np.fft.rfft(wide - middle, size, axis=0)
+    bins *= response.reshape(-1, *[1] * (x.ndim - 1))
+    return np.asarray(np.fft.irfft(bins, size, axis=0)[pad : pad + len(x)] + middle)
 
 
 def thinned(x: npt.NDArray[Any], response: Array, count: int) -> npt.NDArray[Any]:

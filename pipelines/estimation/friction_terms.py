@@ -19,7 +19,7 @@ import numpy as np
 
 from pipelines.effects import find_effect
 from pipelines.effects.base import Effect, plainer
-from pipelines.estimation.config import TermsConfig
+from pipelines.estimation.config import FitConfig
 from pipelines.estimation.exact_model import Exact
 from pipelines.estimation.model_fit import Refined, refine, torque_gain_of
 from pipelines.estimation.nominal_fit import fit_nominal
@@ -28,7 +28,7 @@ from pipelines.estimation.regression import Columns
 from pipelines.estimation.rows import Data
 from pipelines.io.log import Array
 
-_CONFIG = TermsConfig()
+_CONFIG = FitConfig()
 _AS_LITTLE = "fewer terms leave as little of what was held out"
 
 

@@ -32,7 +32,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
-from pipelines.estimation.config import ClockConfig, GridConfig
+from pipelines.estimation.config import MotionConfig
 from pipelines.estimation.filters import apply_kernel, half_width, kernel
 from pipelines.io.limits import SHORTEST, recorded_span
 from pipelines.io.log import Array, ExperimentLog
@@ -42,7 +42,7 @@ Indices = npt.NDArray[np.intp]
 # samples of a grid -> states and deviations (order, samples, joints)
 Tracker = Callable[[Array], tuple[Array, Array]]
 
-_CONFIG, _CLOCK = GridConfig(), ClockConfig()
+_CONFIG = MotionConfig()
 _EVEN = "record with an even clock, or resample with 'rrrid import'"
 
 
@@ -214,7 +214,7 @@ def evened(log: ExperimentLog, good: Usable) -> Evened | None:
     Raises:
         InputRejected: T05, samples lie on each other.
     """
-    if good.time.jitter <= _CLOCK.even or not good.runs:
+    if good.time.jitter <= _CONFIG.even or not good.runs:
         return None
     step = log.sample_time if good.time.known else good.time.median
     parts, stretches, done = [], [], 0
@@ -240,8 +240,8 @@ def _sampled(
     tau = np.where(good.torque_spikes[run], np.nan, good.log.tau[run])
     lost = np.hstack([np.isnan(q), np.isnan(tau), good.saturated[run]]).astype(np.float64)
     order = np.argsort(t, kind="stable")
-    order = order[np.diff(t[order], prepend=-np.inf) >= _CLOCK.closest * step]
-    if len(order) < (1.0 - _CLOCK.merged) * len(t):
+    order = order[np.diff(t[order], prepend=-np.inf) >= _CONFIG.closest * step]
+    if len(order) < (1.0 - _CONFIG.merged) * len(t):
         words = f"the clock is too uneven: {len(t) - len(order)} of {len(t)} samples lie on "
         where = good.log.source or good.log.name
         raise InputRejected("T05", f"{words}another's place", where=where, remedy=_EVEN)
@@ -294,20 +294,20 @@ def instants(stamps: Array, q: Array, step: float) -> Instants:
         step: [s] nominal sample time.
     """
     tick = _ticks(stamps)
-    half = half_width(step, _CLOCK.smooth_hz, _CLOCK.order)
+    half = half_width(step, _CONFIG.smooth_hz, _CONFIG.order)
     near = np.zeros(len(q), dtype=bool)  # a lost sample
     for k in np.flatnonzero(np.diff(stamps) > 2.5 * step).tolist():
         near[max(0, k - 2 * half) : k + 2 * half + 1] = True
     keep = ~near[2 * half : -2 * half]
     if len(q) < 6 * half + 1 or not keep.any() or np.array_equal(tick, stamps):
         return Instants(stamps)
-    level = kernel(half, _CLOCK.order, 0)
-    speed = apply_kernel(q, kernel(half, _CLOCK.order, 1)) / step
+    level = kernel(half, _CONFIG.order, 0)
+    speed = apply_kernel(q, kernel(half, _CONFIG.order, 1)) / step
     inner = q[half:-half], speed * (stamps - tick)[half:-half, None]
     rest, moved = ((x[half:-half] - apply_kernel(x, level))[keep] for x in inner)
     speed = speed[half:-half][keep]
     noise, jitter, share = np.ones(rest.shape[1]), 0.0, 1.0
-    for _ in range(_CLOCK.passes):
+    for _ in range(_CONFIG.passes):
         weight = 1.0 / (noise + (speed * jitter) ** 2)
         power = float(np.sum(weight * moved**2))
         if power <= 0.0:
@@ -338,13 +338,13 @@ def _ticks(stamps: Array) -> Array:
     The smoothed level of a local level model is (I + (σ_e²/σ_walk²) DᵀD)⁻¹ x, D the first
     difference (Harvey 1989, sec. 4.6); without a walk it is the straight line itself.
     """
-    count, lag = _numbers(stamps), min(_CLOCK.lag, len(stamps) // 4)
+    count, lag = _numbers(stamps), min(_CONFIG.lag, len(stamps) // 4)
     if lag < 2:
         return stamps
     x = stamps - np.polyval(np.polyfit(count, stamps, 1), count)
     near, far = (float(np.mean((x[m:] - x[:-m]) ** 2)) for m in (1, lag))
     chance = near * np.sqrt(2.0 / len(x))  # standard deviation of far - near without a walk
-    walk = (far - near) / (lag - 1) if far - near > _CLOCK.sure * chance else 0.0
+    walk = (far - near) / (lag - 1) if far - near > _CONFIG.sure * chance else 0.0
     white = 0.5 * (near - walk)
     if white <= 0.0:
         return stamps
@@ -364,13 +364,13 @@ def _numbers(stamps: Array) -> Array:
     A loss puts all later stamps off; a late stamp does so to itself alone. A long interval is a
     loss of as many samples as the medians of the stamps before and after it lie apart.
     """
-    typical, around = float(np.median(np.diff(stamps))), _CLOCK.around
+    typical, around = float(np.median(np.diff(stamps))), _CONFIG.around
     excess = np.diff(stamps) / typical - 1.0
     near = np.pad(excess, 1)
     least = np.minimum(excess, np.minimum(excess + near[:-2], excess + near[2:]))
     long, lost = np.flatnonzero(excess > 0.5), np.zeros(len(stamps))
     lost[1:] = np.maximum(0.0, np.rint(least))  # a late stamp is followed by a short interval
-    for _ in range(_CLOCK.passes):  # losses nearby, as the pass before has them, are taken out
+    for _ in range(_CONFIG.passes):  # losses nearby, as the pass before has them, are taken out
         early = stamps / typical - np.arange(len(stamps)) - np.cumsum(lost)
         windows = np.lib.stride_tricks.sliding_window_view(
             np.pad(early, around, mode="edge"), around

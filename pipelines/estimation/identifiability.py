@@ -16,11 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.estimation.config import IdentifiabilityConfig
+from pipelines.estimation.config import UncertaintyConfig
 from pipelines.estimation.least_squares import Flags, Solution, Statistics
 from pipelines.io.log import Array
 
-_CONFIG = IdentifiabilityConfig()
+_CONFIG = UncertaintyConfig()
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from pipelines.dynamics.altered import chain_of
 from pipelines.dynamics.body import Array, RigidBody
 from pipelines.dynamics.chain import STANDARD
 from pipelines.dynamics.kinematics import SerialChain
-from pipelines.estimation.config import LinksConfig
+from pipelines.estimation.config import UncertaintyConfig
 from pipelines.estimation.consistency import (
     PSEUDO,
     barrier,
@@ -29,7 +29,7 @@ from pipelines.io.robot import RobotDescription, inconsistency_of_link
 
 __all__ = ["Links", "carried", "consistent_links", "prior_links"]
 
-_CONFIG = LinksConfig()
+_CONFIG = UncertaintyConfig()
 _DEPENDENT = 1e-9  # numerics: rounding of a projection
 _SINGULAR = 1e-12  # numerics: rounding of an eigenvalue of correlations
 _UNITS = ("kg", *("kg m",) * 3, *("kg m^2",) * 6)

@@ -24,7 +24,7 @@ import numpy as np
 
 from pipelines.dynamics.body import Motion
 from pipelines.errors import Check, InputRejected, Level
-from pipelines.estimation.config import MeanPeriodConfig
+from pipelines.estimation.config import PeriodConfig
 from pipelines.estimation.estimate import Fitted, Judged
 from pipelines.estimation.filters import passed_both_ways
 from pipelines.estimation.grids import Grid, grids, lay_on, measured
@@ -48,7 +48,7 @@ from pipelines.io.limits import shorter_than_period
 from pipelines.io.log import Array, ExperimentLog, recording
 from pipelines.quality.segments import quantum, usable
 
-_CONFIG = MeanPeriodConfig()
+_CONFIG = PeriodConfig()
 _SEED = 20040509  # numerics
 _DRAWS = 3  # numerics: of the noise of positions: their mean power is known to a few per cent
 

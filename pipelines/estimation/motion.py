@@ -21,7 +21,7 @@ import numpy as np
 
 from pipelines.dynamics.body import Motion
 from pipelines.errors import InputRejected, UsageError
-from pipelines.estimation.config import ReconstructionConfig
+from pipelines.estimation.config import MotionConfig
 from pipelines.estimation.grids import Measured, evened, lay_on, measured, on_grid
 from pipelines.estimation.state_estimation import Observer, Track, design, observe, smooth
 from pipelines.estimation.tuning import Tuned, sigma_for_bandwidth, tune
@@ -30,7 +30,7 @@ from pipelines.io.option import option
 from pipelines.quality.segments import Mask, Usable, long_blocks, usable
 
 METHODS = ("smoother", "observer")
-_CONFIG = ReconstructionConfig()
+_CONFIG = MotionConfig()
 _SIGNALS = ("q_hat", "dq_hat", "ddq_hat")
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipelines.estimation.config import ResultConfig
+from pipelines.estimation.config import MotionConfig
 from pipelines.estimation.filters import welch
 from pipelines.estimation.grids import Measured, lay_on, measured
 from pipelines.estimation.mean_period import NoiseFloor, mean_period
@@ -23,7 +23,7 @@ from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.results import NOT_STORED
 from pipelines.io.schema import joint_unit
 
-_CONFIG = ResultConfig()
+_CONFIG = MotionConfig()
 
 
 @dataclass(frozen=True)

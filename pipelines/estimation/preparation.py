@@ -24,7 +24,7 @@ import numpy as np
 from pipelines.dynamics.arm import Arm
 from pipelines.effects.base import FrictionLaw
 from pipelines.errors import InputRejected, NothingMatched
-from pipelines.estimation.config import PreparationConfig
+from pipelines.estimation.config import FitConfig
 from pipelines.estimation.estimate import (
     Recipe,
     equations_of,
@@ -44,7 +44,7 @@ from pipelines.estimation.tuning import smoother_bandwidth
 from pipelines.io.log import ExperimentLog, recording
 from pipelines.quality.segments import Mask
 
-_CONFIG = PreparationConfig()
+_CONFIG = FitConfig()
 BLOCKS = 10  # numerics: of time, held out in turn where no log is of role "validate"
 # experiments in which all joints move: a joint that is held sticks, and no law tells
 _MOVING = ("excitation", "free", "writing")

@@ -21,30 +21,30 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import accumulate, pairwise
+from math import ceil
 
 import numpy as np
 
 from pipelines.dynamics.body import Array, Motion, RigidBody
 from pipelines.dynamics.rrr import ACTING, RRR
 from pipelines.effects.base import ArmModel, Effect
-from pipelines.estimation.config import RegressionConfig
+from pipelines.estimation.config import FitConfig
 from pipelines.estimation.filters import (
     KEEP,
-    LowPass,
     centre_hold,
     centre_samples,
     choose_decimation,
     choose_step,
-    design_low_pass,
     zero_phase,
 )
 from pipelines.estimation.least_squares import Block, Flags, Indices
 from pipelines.estimation.motion import Reconstructed
 from pipelines.io.limits import GAP_TICKS
 
-_CONFIG = RegressionConfig()
+_CONFIG = FitConfig()
 _SEED = 20040509  # numerics
 _BLOCK = 32768  # numerics: samples of the log worked on at once
+_SHORTEST = 30  # numerics: samples of a stretch that a low-pass goes over
 _SETTLE = 10.0  # numerics: periods of the cut-off after which a low-pass has forgotten to 1e-10
 
 
@@ -52,8 +52,7 @@ _SETTLE = 10.0  # numerics: periods of the cut-off after which a low-pass has fo
 class Conditioning:
     """The filter and decimation of torque and columns."""
 
-    low_pass: LowPass | None
-    cutoff_hz: float | None
+    cutoff_hz: float | None  # None: the rate is too low for one
     decimation: int
     step: Fraction  # samples between rows that are thinned out in the frequency domain
     min_speed: tuple[float, ...]  # [rad/s] slower samples of a joint make no equations of it
@@ -69,18 +68,14 @@ def condition(
 ) -> Conditioning:
     """Return the filter for a log, its cut-off from the motion where none is given.
 
-    There is none where the rate is too low for it.
-
     Args:
         keep: samples left in a period of the cut-off, where no decimation is given.
     """
     cutoff = cutoff_at(wanted_cutoff(motion, rate) if cutoff_hz is None else cutoff_hz, rate)
-    speeds = tuple(map(float, min_speed))
-    if cutoff is None:
-        return Conditioning(None, None, decimation or 1, Fraction(decimation or 1), speeds)
-    every = decimation or choose_decimation(cutoff, rate, keep)
-    step = Fraction(decimation) if decimation else choose_step(cutoff, rate, keep)
-    return Conditioning(design_low_pass(cutoff, rate), cutoff, every, step, speeds)
+    every, step = decimation or 1, Fraction(decimation or 1)
+    if cutoff is not None and decimation is None:
+        every, step = choose_decimation(cutoff, rate, keep), choose_step(cutoff, rate, keep)
+    return Conditioning(cutoff, every, step, tuple(map(float, min_speed)))
 
 
 def cutoff_at(cutoff_hz: float | None, rate: float) -> float | None:
@@ -229,23 +224,27 @@ class LogEquations:
     chosen: Rows | None = None  # instead of the log's own choice: the same for several motions
 
     def __iter__(self) -> Iterator[Block]:
-        how, rate = self.conditioning, 1.0 / self.found.good.log.sample_time
-        margin = 2 if how.cutoff_hz is None else int(np.ceil(_SETTLE * rate / how.cutoff_hz))
+        how = self.conditioning
+        margin = 2 if how.cutoff_hz is None else ceil(_SETTLE * self.rate / how.cutoff_hz)
         for run in self.runs:
             edges = [*range(run.start, run.stop, _BLOCK), run.stop]
             if len(edges) > 2 and edges[-1] - edges[-2] < margin:
                 del edges[-2]  # a short rest joins the stretch before it
             for first, last in pairwise(edges):
-                wide = slice(max(run.start, first - margin), min(run.stop, last + margin))
                 moments = self._moments(run, first, last)
                 if len(moments):
+                    wide = slice(max(run.start, first - margin), min(run.stop, last + margin))
                     yield self._block(wide, moments)
+
+    @property
+    def rate(self) -> float:
+        """[1/s] samples of the log."""
+        return 1.0 / self.found.good.log.sample_time
 
     @cached_property
     def runs(self) -> tuple[slice, ...]:
         """Stretches without a gap that outlast the low-pass."""
-        low_pass = self.conditioning.low_pass
-        shortest = 8 if low_pass is None else 2 * low_pass.padding
+        shortest = 8 if self.conditioning.cutoff_hz is None else _SHORTEST
         return tuple(run for run in self.found.good.runs if run.stop - run.start > shortest)
 
     @cached_property
@@ -254,11 +253,10 @@ class LogEquations:
         if self.chosen is not None:
             return self.chosen
         good, how = self.found.good, self.conditioning
-        spoilt = (good.missing | good.spikes | good.saturated) | self._unknown
-        touched = np.asarray(spoilt.any(axis=1))
+        touched = (self._spoilt | self._unknown).any(axis=1)
         out, reach = np.ones(len(touched), dtype=bool), 2
         if how.cutoff_hz is not None:
-            reach = int(np.ceil(_CONFIG.touched / (how.cutoff_hz * good.log.sample_time)))
+            reach = ceil(_CONFIG.touched * self.rate / how.cutoff_hz)
         for run in self.runs:
             count = np.cumsum(np.pad(touched[run].astype(np.float64), (reach + 1, reach)))
             out[run] = count[2 * reach + 1 :] > count[: -2 * reach - 1]
@@ -269,18 +267,17 @@ class LogEquations:
 
     def _near_peaks(self, rows: Flags) -> Flags:
         """Return which samples are too near to torque beyond its limit; none without a low-pass."""
-        good, low_pass = self.found.good, self.conditioning.low_pass
+        good, cutoff_hz = self.found.good, self.conditioning.cutoff_hz
         near = np.zeros_like(rows)
-        if low_pass is None:
-            return near
-        for j in np.flatnonzero(good.saturated.any(axis=0)):
+        for j in np.flatnonzero(good.saturated.any(axis=0) & (cutoff_hz is not None)):
             beyond, lost = good.saturated[:, j, None], (good.missing | good.spikes)[:, j, None]
             commanded = bridged(good.log.tau[:, j, None], lost)
             least = _CONFIG.matters * float(np.where(beyond, 0.0, np.abs(commanded)).max())
             differ = commanded - bridged(commanded, beyond | lost)
             depends = np.zeros(len(rows), dtype=bool)
             for run in self.runs:
-                depends[run] = np.abs(zero_phase(differ[run], low_pass))[:, 0] > least
+                left = zero_phase(differ[run], cutoff_hz or 0.0, self.rate)
+                depends[run] = np.abs(left[:, 0]) > least
             if np.sum(rows[:, j] & ~depends) > _CONFIG.few * np.sum(rows[:, j]):
                 near[:, j] = depends
         return near
@@ -288,16 +285,7 @@ class LogEquations:
     @cached_property
     def counts(self) -> Indices:
         """(joints,) equations there are of each joint."""
-        slow = [self.rows.slow[self._moments(run, run.start, run.stop)] for run in self.runs]
-        return np.asarray(sum(np.sum(~own, axis=0) for own in slow), dtype=np.intp)
-
-    @property
-    def counted(self) -> tuple[slice, ...]:
-        """The runs without what is a copy of a mean period."""
-        if (mean := self.found.mean) is None:
-            return self.runs
-        ends = [(max(run.start, mean.first), min(run.stop, mean.last)) for run in self.runs]
-        return tuple(slice(*end) for end in ends)
+        return np.asarray(np.sum(~self.rows.slow[self._every], axis=0), dtype=np.intp)
 
     @property
     def repeats(self) -> float:
@@ -307,14 +295,17 @@ class LogEquations:
     @property
     def guard(self) -> int:
         """Equations apart, from which on two share no noise: what a low-pass spreads."""
-        how, step = self.conditioning, self.found.good.log.sample_time
+        how = self.conditioning
         reach = 2.0 * _CONFIG.touched / how.cutoff_hz if how.cutoff_hz else _CONFIG.memory
-        return int(np.ceil(reach / (step * how.decimation)))
+        return ceil(reach * self.rate / how.decimation)
 
     def moments(self) -> Indices:
         """Return the sample of the recording of every equation."""
-        every = [self._moments(run, run.start, run.stop) for run in self.runs]
-        return np.asarray(self.found.good.kept[np.concatenate(every)])
+        return np.asarray(self.found.good.kept[self._every])
+
+    @property
+    def _every(self) -> Indices:
+        return np.concatenate([self._moments(run, run.start, run.stop) for run in self.runs])
 
     def _moments(self, run: slice, first: int, last: int) -> Indices:
         """Return the samples first … last - 1 of the repaired log that make equations of any joint.
@@ -328,7 +319,7 @@ class LogEquations:
 
     def _block(self, wide: slice, moments: Indices) -> Block:
         """Return the equations of `moments`, conditioned with the samples of `wide` around them."""
-        low_pass, begin = self.conditioning.low_pass, int(self.held)
+        cutoff_hz, begin = self.conditioning.cutoff_hz, int(self.held)
         motion, tau = self.stretch(wide)
         rows, places = self.columns.rows(motion)
         known = None if self.known is None else self.known(motion)
@@ -340,14 +331,19 @@ class LogEquations:
         slow, values, y = self.rows.slow[moments], [], []
         for row, torque, still in zip(rows, tau.T, slow.T, strict=True):
             stack = np.vstack([row, torque]).T
-            if low_pass is not None:
-                stack = zero_phase(stack, low_pass)
+            if cutoff_hz is not None:
+                stack = zero_phase(stack, cutoff_hz, self.rate)
             own = np.sqrt(self.repeats) * stack[moments - wide.start - begin].T
             own = np.ascontiguousarray(np.where(still, 0.0, own))
             values.append(own[:-1])
             y.append(own[-1])
         used = tuple(~slow.T) if slow.any() else None
         return Block(len(self.columns.names), places, tuple(values), tuple(y), used)
+
+    @cached_property
+    def _spoilt(self) -> Flags:
+        good = self.found.good
+        return np.asarray(good.missing | good.spikes | good.saturated)
 
     @cached_property
     def _unknown(self) -> Flags:
@@ -364,10 +360,10 @@ class LogEquations:
         """
         good, m = self.found.good, self.found.motion
         rows, unknown = good.kept[wide], self._unknown[wide]
-        spoilt = (good.missing | good.spikes | good.saturated)[wide]
         q = bridged(m.q[rows], ~np.isfinite(m.q[rows]))
         dq, ddq = (bridged(x[rows], unknown) for x in (m.dq, m.ddq))
-        return replace(m, t=m.t[rows], q=q, dq=dq, ddq=ddq), bridged(good.log.tau[wide], spoilt)
+        tau = bridged(good.log.tau[wide], self._spoilt[wide])
+        return replace(m, t=m.t[rows], q=q, dq=dq, ddq=ddq), tau
 
 
 def bridged(x: Array, bad: Flags) -> Array:

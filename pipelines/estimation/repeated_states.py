@@ -19,7 +19,7 @@ from itertools import chain
 
 import numpy as np
 
-from pipelines.estimation.config import RepeatedConfig
+from pipelines.estimation.config import FitConfig
 from pipelines.estimation.estimate import Estimate, estimate
 from pipelines.estimation.judgements import Facts, one_way, predicted_std, unresolved
 from pipelines.estimation.least_squares import Flags, Indices
@@ -30,7 +30,7 @@ from pipelines.estimation.regression import Columns, LogEquations
 from pipelines.estimation.rows import Data
 from pipelines.io.log import Array
 
-_CONFIG = RepeatedConfig()
+_CONFIG = FitConfig()
 _NEIGHBOURS = 32  # numerics: that are looked at; slow motion has many next to it in time
 _OTHER_LOG = 1e9  # numerics: [s] between the clocks of two logs
 _FEWEST = 100  # numerics: pairs of a joint; fewer say little
@@ -49,7 +49,7 @@ class Repeated:
         """Return the pairs, nearest first."""
         logs = []
         for one in data.logs:
-            m, still = one.motion, _CONFIG.still
+            m, still = one.motion, _CONFIG.alike
             scaled = zip((m.q, m.dq, m.ddq), still, strict=True)
             logs.append(np.hstack([one.at_rows(x) / least for x, least in scaled]))
         log = np.repeat(np.arange(len(logs)), [len(own) for own in logs])

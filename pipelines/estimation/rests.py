@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.estimation.config import RestConfig
+from pipelines.estimation.config import FitConfig
 from pipelines.estimation.estimate import Recipe, Stacked, equations_of
 from pipelines.estimation.least_squares import fit
 from pipelines.estimation.motion import Motions
@@ -26,7 +26,7 @@ from pipelines.estimation.regression import Columns, Rows
 from pipelines.io.log import Array
 from pipelines.quality.segments import Mask, blocks
 
-_CONFIG = RestConfig()
+_CONFIG = FitConfig()
 
 
 def moving_rows(
@@ -51,7 +51,7 @@ def moving_rows(
     moving = [replace(one, slow=one.slow | mask) for one, mask in zip(rows, still, strict=True)]
     own = [replace(one, chosen=part) for one, part in zip(equations, moving, strict=True)][:fitted]
     counts = np.sum([one.counts for one in own], axis=0)
-    if not any(mask.any() for mask in still[:fitted]) or counts.min() < _CONFIG.least:
+    if not any(mask.any() for mask in still[:fitted]) or counts.min() < _CONFIG.fewest_of_joint:
         return rows
     weights = None if weighted else np.ones(len(counts))
     beta = fit(Stacked(own), weights=weights).solution.beta
@@ -80,7 +80,7 @@ def _rests(motions: Motions, cutoff_hz: float | None) -> list[Mask]:
     for (log, _), dq, ddq in zip(motions, speeds, accelerations, strict=True):
         period = _CONFIG.memory if cutoff_hz is None else 1.0 / cutoff_hz
         least = math.ceil(period / log.sample_time)
-        slow = np.hypot(dq / usual[0], ddq / usual[1]) < _CONFIG.still
+        slow = np.hypot(dq / usual[0], ddq / usual[1]) < _CONFIG.resting
         out = np.zeros(slow.shape, dtype=bool)
         for j in range(slow.shape[1]):
             for start, stop in blocks(slow[:, j]):

@@ -10,11 +10,10 @@ import numpy as np
 
 from pipelines.dynamics.arm import Arm, ArmTorque
 from pipelines.errors import Check, UsageError
-from pipelines.estimation.balance import Balance
 from pipelines.estimation.checks.boundary import Boundary
 from pipelines.estimation.consistency import Consistent
 from pipelines.estimation.estimate import Fitted
-from pipelines.estimation.filters import choose_decimation, design_low_pass, zero_phase
+from pipelines.estimation.filters import choose_decimation, zero_phase
 from pipelines.estimation.mean_period import PeriodicLog
 from pipelines.estimation.motion import Motions, Reconstructed, Reconstruction
 from pipelines.estimation.regression import bridged, cutoff_at
@@ -76,7 +75,6 @@ class Result:
     friction: str  # "fitted" | "given"
     physically_consistent: bool | None  # None: not all parameters are determined
     consistency: Consistent | None
-    balance: Balance | None
     unresolved: str  # words; empty where everything shows
     # parameters determined only together
     not_separated: tuple[tuple[str, ...], ...] = field(default=(), kw_only=True)
@@ -172,18 +170,15 @@ def course(
     """Return the torques of `log` along its time, as the fit saw them."""
     good, rate, n = found.good, 1.0 / log.sample_time, log.n_joints
     cutoff_hz = cutoff_at(cutoff_hz, rate)
-    low_pass, every = None, 1
-    if cutoff_hz is not None:
-        low_pass = design_low_pass(cutoff_hz, rate)
-        every = max(1, choose_decimation(cutoff_hz, rate) // 2)
+    every = 1 if cutoff_hz is None else max(1, choose_decimation(cutoff_hz, rate) // 2)
     pieces = []
     for run in good.runs:
         rows = good.kept[run]
         spoilt = (good.missing | good.spikes | good.saturated)[run]
         measured = bridged(good.log.tau[run], spoilt)
         torque = np.hstack([measured, parts.total[rows], parts.friction[rows]])
-        if low_pass is not None and len(torque) > low_pass.padding:
-            torque = zero_phase(torque, low_pass)
+        if cutoff_hz is not None:
+            torque = zero_phase(torque, cutoff_hz, rate)
         torque[:, :n][spoilt] = np.nan
         left = torque[:, :n] - torque[:, n : 2 * n]
         piece = np.column_stack([log.t[rows] - log.t[0], torque, left])[::every]

@@ -36,6 +36,7 @@ from pipelines.estimation.estimate import Recipe, equations_of
 from pipelines.estimation.filters import (
     AMPLE,
     COARSE,
+    PAD,
     ample,
     fast_length,
     passed_both_ways,
@@ -50,7 +51,6 @@ from pipelines.io.log import Array, ExperimentLog
 
 Signals = npt.NDArray[Any]
 
-PAD = 4.0  # numerics: periods of the cut-off by which a stretch is continued
 END = 2.0  # numerics: periods of the cut-off left out at either end: so far the low-pass reaches
 _AT_ONCE = 8  # numerics: channels, which stay near the processor
 _ORDER = 20  # numerics: rows that predict one: as far as the noise of the low-pass reaches

@@ -19,10 +19,10 @@ import numpy as np
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.estimation.chain import ORDERS, Array, stationary
-from pipelines.estimation.config import TuningConfig
+from pipelines.estimation.config import MotionConfig
 from pipelines.estimation.state_estimation import BLOCK, Mask, Observer, bisected, observe
 
-_CONFIG = TuningConfig()
+_CONFIG = MotionConfig()
 # Λ of filters -> what they cost, and the R that goes with each
 _Criterion = Callable[[Array], tuple[Array, Array]]
 

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from pipelines.dynamics.body import Array, Motion
 from pipelines.estimation.estimate import Fitted, Recipe, equations_of, fit_logs, with_cutoff
-from pipelines.estimation.filters import LowPass, centre_samples, zero_phase
+from pipelines.estimation.filters import centre_samples, zero_phase
 from pipelines.estimation.motion import Motions
 from pipelines.estimation.nominal import nominal_columns
 from pipelines.estimation.regression import Columns as RigidColumns
@@ -35,12 +35,13 @@ class _Run:
 
     motion: Motion  # (samples, 1)
     held: bool
-    low_pass: LowPass | None
+    cutoff_hz: float | None
+    rate: float
     rows: npt.NDArray[np.intp]  # samples of the run, after centring
 
     def conditioned(self, columns: Array) -> Array:
         x = centre_samples(columns) if self.held else columns
-        return (x if self.low_pass is None else zero_phase(x, self.low_pass))[self.rows]
+        return (x if self.cutoff_hz is None else zero_phase(x, self.cutoff_hz, self.rate))[self.rows]
 
 
 def _runs_of(log: LogEquations, j: int) -> list[_Run]:
@@ -55,7 +56,7 @@ def _runs_of(log: LogEquations, j: int) -> list[_Run]:
         states = (np.interp(at, at[known], x[rows, j][known])[:, None]
                   for x in (motion.q, motion.dq, motion.ddq))
         own = times[(times >= t[0]) & (times <= t[-1])]
-        runs.append(_Run(Motion(t, *states), log.held, log.conditioning.low_pass,
+        runs.append(_Run(Motion(t, *states), log.held, log.conditioning.cutoff_hz, log.rate,
                          np.searchsorted(t, own) - int(log.held)))
     return runs
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pipelines.estimation.config import BalanceConfig
+from pipelines.estimation.config import FitConfig
 from pipelines.estimation.nominal import column_in_words
 from pipelines.estimation.result import Estimated, Result
 from pipelines.report.config import REPORT
@@ -25,8 +25,7 @@ def bps_report(result: Result) -> Report:
     """The verdict, Table V with standard deviations, and what the estimate rests on."""
     worst, noise = _worst_joints(result), _above_noise(result)
     moved, mover = _settling(result)
-    balance = result.balance
-    sound = not worst and moved <= BalanceConfig.alone and (balance is None or balance.agree)
+    sound = not worst and moved <= FitConfig.settled
     report = document(
         "bps",
         _tone(result, sound and noise[0] <= REPORT.above_noise),
@@ -42,13 +41,10 @@ def bps_report(result: Result) -> Report:
         tones=[_TONES.get(identifiability(p), "bad") for p in result.parameters],
         together=[[column_in_words(name) for name in group] for group in result.not_separated],
         words=figure_in_words,
-        balance=balance,
-        differing=_differing(result),
-        by_torque={p.name: p for p in result.parameters},
         moved=moved,
         mover=mover,
         sure=REPORT.sure,
-        limits=BalanceConfig,
+        limit=FitConfig.settled,
         apart=_apart(result),
         far=_FAR,
         rotors=_rotors_within_links(result),
@@ -110,14 +106,6 @@ def _rotors_within_links(result: Result) -> list[int]:
     names = [p.name for p in result.parameters if p.name.startswith("rotor_inertia:")]
     own = {int(name.split(":")[1]) for name in names}
     return [j for j in range(1, len(result.joints) + 1) if own and j not in own]
-
-
-def _differing(result: Result) -> list[str]:
-    """Parameters on which the balance of power and the torques do not agree."""
-    if result.balance is None:
-        return []
-    pairs = zip(result.balance.names, result.balance.apart, strict=True)
-    return [figure_in_words(name, True) for name, apart in pairs if apart > BalanceConfig.alone]
 
 
 def _settling(result: Result) -> tuple[float, str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.estimation.config import ResultConfig
+from pipelines.estimation.config import MotionConfig
 from pipelines.estimation.motion_result import LogResult, Series
 from pipelines.report import style
 from pipelines.report.config import REPORT
@@ -35,7 +35,7 @@ def motion_report(logs: Sequence[LogResult]) -> Report:
         doubtful=doubtful,
         far=far,
         strays=_strays(far),
-        rules=ResultConfig(),
+        rules=MotionConfig(),
         words=sorted(
             {word.split(":")[0].split(",")[0] for log in logs for word in log.innovation_verdict}
         ),
@@ -74,7 +74,7 @@ def _strays(far: Sequence[LogResult]) -> dict[str, object] | None:
     limit = float(log.alarm[joint - 1])
     chance = error < REPORT.chance * noise
     context = {"joint": joint, "name": name, "error": error, "limit": limit, "noise": noise}
-    return context | {"chance": chance, "published": limit == ResultConfig().alarm}
+    return context | {"chance": chance, "published": limit == MotionConfig().alarm}
 
 
 def _observer(log: LogResult) -> Table:

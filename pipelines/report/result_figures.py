@@ -33,7 +33,6 @@ _SLIDING: Final = {"N m": "N", "rad": "m"}  # of a joint that slides
 _NAMING: Final = ("name", "label", "effect", "cause", "kind", "law", "joint", "posture", "method")
 _SILENT: Final = ("parameters", "result", "torque")
 _PASSED_OVER: Final = (
-    "balance",
     "comparison",
     "candidate_laws",
     "rejected",

@@ -19,7 +19,7 @@ from pipelines.dynamics.arm import Arm, ArmTorque
 from pipelines.errors import Check, RrridError
 from pipelines.estimation.filters import zero_phase
 from pipelines.estimation.motion import Reconstructed
-from pipelines.estimation.regression import condition
+from pipelines.estimation.regression import cutoff_at, wanted_cutoff
 from pipelines.importers.controller import ControllerTable
 from pipelines.io.log import Array, ExperimentLog, recording
 from pipelines.io.output import slug
@@ -100,10 +100,11 @@ def _low_passed(
 ) -> tuple[Array, float | None]:
     """Return `torque` in the band of motion and dry friction, and that cut-off [Hz]."""
     torque = np.where(_known(log, motion)[:, None], torque, 0.0)
-    how = condition(motion.motion, 1.0 / log.sample_time, None, None, np.zeros(log.n_joints))
-    if how.low_pass is None or len(torque) <= how.low_pass.padding:
+    rate = 1.0 / log.sample_time
+    cutoff_hz = cutoff_at(wanted_cutoff(motion.motion, rate), rate)
+    if cutoff_hz is None or len(torque) < 2:
         return torque, None
-    return zero_phase(torque, how.low_pass), how.cutoff_hz
+    return zero_phase(torque, cutoff_hz, rate), cutoff_hz
 
 
 def torque_validation(

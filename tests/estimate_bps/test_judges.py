@@ -1,4 +1,4 @@
-"""What judges an estimate: other logs, the balance of power, other ways to reconstruct, a given friction."""
+"""What judges an estimate: other logs, other ways to reconstruct, a given friction."""
 
 from __future__ import annotations
 
@@ -19,27 +19,6 @@ from tests.cli.commands import rrrid
 from tests.estimate_bps.estimates import SYMMETRIC, of_elbow, stage
 from tests.healthy import with_signal
 from tests.model.estimation.experiments import arm, experiment, truth
-
-
-def test_the_balance_of_power_agrees_on_a_healthy_log(good: ExperimentLog, tmp_path: Path) -> None:
-    balance = stage(tmp_path, good).result.balance
-    assert balance is not None
-    assert balance.agree, balance.apart
-
-
-def test_the_balance_of_power_finds_a_late_position(good: ExperimentLog, tmp_path: Path) -> None:
-    """Position three samples late beside the torque: the torque fit and the balance then differ."""
-    late = with_signal(good, q=np.vstack([np.repeat(good.q[:1], 3, axis=0), good.q[:-3]]))
-    balance = stage(tmp_path, late).result.balance
-    assert balance is not None
-    assert not balance.agree
-
-
-def test_the_balance_of_power_finds_a_spoilt_acceleration(good: ExperimentLog, tmp_path: Path) -> None:
-    """An observer of 3 Hz takes acceleration away that the torque has; position and speed hardly suffer."""
-    balance = stage(tmp_path, good, settings=replace(SYMMETRIC, method="observer", bandwidth=(3.0,))).result.balance
-    assert balance is not None
-    assert not balance.agree
 
 
 def test_slow_samples_of_one_joint_leave_the_others_alone(good: ExperimentLog, tmp_path: Path) -> None:
