@@ -42,7 +42,8 @@ def zero_phase(x: Array, cutoff_hz: float, rate: float) -> Array:
     before, behind = 2.0 * x[0] - x[pad:0:-1], 2.0 * x[-1] - x[-2 : -pad - 2 : -1]
     wide = np.concatenate([before, x, behind])
     middle, size = 0.5 * (wide[0] + wide[-1]), fast_length(len(wide))
-    response = passed_both_ways(np.fft.rfftfreq(size, 1.0 / rate), cutoff_hz, rate)
+    hertz = rate / size * np.arange(size // 2 + 1, dtype=np.float64)
+    response = passed_both_ways(hertz, cutoff_hz, rate)
     bins = np.fft.rfft(wide - middle, size, axis=0)
     bins *= response.reshape(-1, *[1] * (x.ndim - 1))
     return np.asarray(np.fft.irfft(bins, size, axis=0)[pad : pad + len(x)] + middle)

@@ -253,7 +253,7 @@ class LogEquations:
         if self.chosen is not None:
             return self.chosen
         good, how = self.found.good, self.conditioning
-        touched = (self._spoilt | self._unknown).any(axis=1)
+        touched = np.asarray((self._spoilt | self._unknown).any(axis=1))
         out, reach = np.ones(len(touched), dtype=bool), 2
         if how.cutoff_hz is not None:
             reach = ceil(_CONFIG.touched * self.rate / how.cutoff_hz)

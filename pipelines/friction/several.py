@@ -41,7 +41,9 @@ class _Run:
 
     def conditioned(self, columns: Array) -> Array:
         x = centre_samples(columns) if self.held else columns
-        return (x if self.cutoff_hz is None else zero_phase(x, self.cutoff_hz, self.rate))[self.rows]
+        if self.cutoff_hz is not None:
+            x = zero_phase(x, self.cutoff_hz, self.rate)
+        return x[self.rows]
 
 
 def _runs_of(log: LogEquations, j: int) -> list[_Run]:

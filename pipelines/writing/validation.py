@@ -102,7 +102,7 @@ def _low_passed(
     torque = np.where(_known(log, motion)[:, None], torque, 0.0)
     rate = 1.0 / log.sample_time
     cutoff_hz = cutoff_at(wanted_cutoff(motion.motion, rate), rate)
-    if cutoff_hz is None or len(torque) < 2:
+    if cutoff_hz is None:
         return torque, None
     return zero_phase(torque, cutoff_hz, rate), cutoff_hz
 

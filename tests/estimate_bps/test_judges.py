@@ -17,7 +17,6 @@ from pipelines.io.robot import format_robot
 from pipelines.report.bps_report import bps_report
 from tests.cli.commands import rrrid
 from tests.estimate_bps.estimates import SYMMETRIC, of_elbow, stage
-from tests.healthy import with_signal
 from tests.model.estimation.experiments import arm, experiment, truth
 
 
