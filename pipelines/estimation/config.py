@@ -24,11 +24,8 @@ class MotionConfig:
     merged: float = 0.05  # of the samples that lie closer than a quarter step: no clock
     smooth_hz: float = 40.0  # above the motion of an arm: what a local polynomial leaves is noise
     order: int = 4  # of the local polynomial (Savitzky & Golay 1964)
-    lag: int = 64  # steps of the variogram: long against one sample, short against a log
-    sure: float = 3.0  # standard deviations, beyond which a walk is not due to chance
-    around: int = 16  # samples before and after a long interval that tell whether one is lost
     passes: int = 3  # of the weights: they are known to a per cent then
-    closest: float = 0.25  # of a step: nearer samples are replaced by their mean
+    closest: float = 0.25  # of a step: nearer samples are merged, stamps that stray farther believed
     # limits of reconstructed motion, and of what may be asked for
     finest: float = 1e-6  # [rad] where no step is described or seen: far below any encoder
     forgotten: float = 7.0  # time constants after which a start is forgotten to about 1/1000

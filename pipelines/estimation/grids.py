@@ -14,11 +14,9 @@ b_k. Of the deviation e_k = s_k - g_k of a stamp from its tick the share
 
 is a deviation of the sampling, the rest is one of the stamp (linear regression). Positions show w:
 to first order y_k = q(g_k) + w dq(g_k) e_k + noise, and the residual of a local polynomial of y is
-free of the smooth q. So w is the coefficient of a regression of that residual on the residual of
-dq e, all joints together, each weighted by its noise R_j + (dq_j σ_t)², where σ_t is the jitter
-that remains. The ticks are a random walk with a white deviation (local level model, Harvey 1989,
-sec. 2.2): a timer has ticks on a straight line, a loop that sleeps between samples walks. The
-variogram of the stamps, E(x_{k+m} - x_k)² = m σ_walk² + 2 σ_e², tells one from the other.
+free of the smooth q. So w is the coefficient of a
+regression of that residual on the residual of dq e, all joints together, each weighted by its
+noise.
 """
 
 from __future__ import annotations
@@ -221,7 +219,7 @@ def evened(log: ExperimentLog, good: Usable) -> Evened | None:
     for run in good.runs:
         stamps = good.log.t[run]
         q = np.where(good.position_spikes[run], np.nan, good.log.q[run])
-        t = instants(stamps, _filled(stamps, q), step).t
+        t, _ = instants(stamps, _filled(stamps, q), step)
         at = grid(float(t.min()), float(t.max()), 1.0 / step)
         parts.append((at, *_sampled(good, run, q, t, at, step)))
         stretches.append((run, slice(done, done + len(at)), t))
@@ -276,105 +274,48 @@ def average_held(t: Array, u: Array, at: Array, step: float) -> Array:
     return np.asarray(np.stack(moved, axis=1) / step)
 
 
-@dataclass(frozen=True, eq=False)
-class Instants:
-    """When samples were taken."""
-
-    t: Array  # [s] (samples,)
-    share: float = 1.0  # w of the deviations that is of the sampling; 1 where the clock has none
-    jitter: float = 0.0  # [s] σ_t that remains between t and the true instants
-
-
-def instants(stamps: Array, q: Array, step: float) -> Instants:
-    """Return when the samples of one unbroken stretch were taken.
+def instants(stamps: Array, q: Array, step: float) -> tuple[Array, float]:
+    """Return when the samples of one unbroken stretch were taken [s], and the share w.
 
     Args:
         stamps: [s] (samples,), increasing.
         q: positions [rad or m] (samples, joints), finite.
         step: [s] nominal sample time.
     """
-    tick = _ticks(stamps)
     half = half_width(step, _CONFIG.smooth_hz, _CONFIG.order)
+    tick = _ticks(stamps)
     near = np.zeros(len(q), dtype=bool)  # a lost sample
     for k in np.flatnonzero(np.diff(stamps) > 2.5 * step).tolist():
         near[max(0, k - 2 * half) : k + 2 * half + 1] = True
     keep = ~near[2 * half : -2 * half]
-    if len(q) < 6 * half + 1 or not keep.any() or np.array_equal(tick, stamps):
-        return Instants(stamps)
+    if len(q) < 6 * half + 1 or not keep.any():
+        return stamps, 1.0
     level = kernel(half, _CONFIG.order, 0)
     speed = apply_kernel(q, kernel(half, _CONFIG.order, 1)) / step
     inner = q[half:-half], speed * (stamps - tick)[half:-half, None]
     rest, moved = ((x[half:-half] - apply_kernel(x, level))[keep] for x in inner)
-    speed = speed[half:-half][keep]
-    noise, jitter, share = np.ones(rest.shape[1]), 0.0, 1.0
+    weight, share = np.ones(rest.shape[1]), 1.0
     for _ in range(_CONFIG.passes):
-        weight = 1.0 / (noise + (speed * jitter) ** 2)
         power = float(np.sum(weight * moved**2))
         if power <= 0.0:
-            return Instants(stamps)
-        share = float(np.sum(weight * moved * rest)) / power
-        noise, jitter = _noise(rest - share * moved, speed, 1.0 - float(level[half]))
-    share = float(np.clip(share, 0.0, 1.0))
-    return Instants(tick + share * (stamps - tick), share, jitter)
-
-
-def _noise(rest: Array, speed: Array, free: float) -> tuple[Array, float]:
-    """Return the noise R (joints,) [rad²] and the jitter σ_t [s] behind residuals (n, joints).
-
-    E r² = (1 - h) (R_j + dq² σ_t²) with `free` = 1 - h, h the weight of the polynomial at its
-    middle: one straight line over dq² for all joints, each with its own level; slope not negative.
-    """
-    power, square = rest**2 / free, speed**2
-    base, usual = np.maximum(power.mean(axis=0), 1e-300), square.mean(axis=0)
-    centred = (square - usual) / base
-    slope = float(np.sum(centred * power / base)) / max(float(np.sum(centred**2)), 1e-300)
-    slope = float(np.clip(slope, 0.0, np.min(base / np.maximum(usual, 1e-300))))
-    return np.maximum(base - slope * usual, 1e-3 * base), float(np.sqrt(slope))
+            return stamps, 1.0
+        share = float(np.clip(np.sum(weight * moved * rest) / power, 0.0, 1.0))
+        weight = 1.0 / np.maximum(np.mean((rest - share * moved) ** 2, axis=0), 1e-300)
+    return tick + share * (stamps - tick), share
 
 
 def _ticks(stamps: Array) -> Array:
-    """Return the ticks [s] (samples,) of a clock.
+    """Return a straight line through the stamps [s], over the numbers of the samples.
 
-    The smoothed level of a local level model is (I + (σ_e²/σ_walk²) DᵀD)⁻¹ x, D the first
-    difference (Harvey 1989, sec. 4.6); without a walk it is the straight line itself.
+    A late stamp is followed by a short interval; one long by itself is a loss of samples. A clock
+    that strays from the line, as a loop that sleeps between samples, is believed.
     """
-    count, lag = _numbers(stamps), min(_CONFIG.lag, len(stamps) // 4)
-    if lag < 2:
+    steps = np.diff(stamps)
+    excess = np.pad(steps / float(np.median(steps)) - 1.0, 1)
+    least = np.minimum(excess, np.minimum(excess + np.roll(excess, 1), excess + np.roll(excess, -1)))
+    count = np.arange(len(stamps)) + np.cumsum(np.maximum(0.0, np.rint(least[:-1])))
+    slope, start = np.polyfit(count, stamps, 1)
+    if float(np.std(stamps - start - slope * count)) > _CONFIG.closest * slope:
         return stamps
-    x = stamps - np.polyval(np.polyfit(count, stamps, 1), count)
-    near, far = (float(np.mean((x[m:] - x[:-m]) ** 2)) for m in (1, lag))
-    chance = near * np.sqrt(2.0 / len(x))  # standard deviation of far - near without a walk
-    walk = (far - near) / (lag - 1) if far - near > _CONFIG.sure * chance else 0.0
-    white = 0.5 * (near - walk)
-    if white <= 0.0:
-        return stamps
-    if walk <= 0.0:
-        return stamps - x
-    from scipy.linalg import solveh_banded
-
-    band = np.full((2, len(x)), -white / walk)
-    band[1] = 1.0 + 2.0 * white / walk
-    band[1, [0, -1]] = 1.0 + white / walk
-    return np.asarray(stamps - (x - solveh_banded(band, x)))
-
-
-def _numbers(stamps: Array) -> Array:
-    """Return the numbers of the samples: one more each, and one for every sample lost.
-
-    A loss puts all later stamps off; a late stamp does so to itself alone. A long interval is a
-    loss of as many samples as the medians of the stamps before and after it lie apart.
-    """
-    typical, around = float(np.median(np.diff(stamps))), _CONFIG.around
-    excess = np.diff(stamps) / typical - 1.0
-    near = np.pad(excess, 1)
-    least = np.minimum(excess, np.minimum(excess + near[:-2], excess + near[2:]))
-    long, lost = np.flatnonzero(excess > 0.5), np.zeros(len(stamps))
-    lost[1:] = np.maximum(0.0, np.rint(least))  # a late stamp is followed by a short interval
-    for _ in range(_CONFIG.passes):  # losses nearby, as the pass before has them, are taken out
-        early = stamps / typical - np.arange(len(stamps)) - np.cumsum(lost)
-        windows = np.lib.stride_tricks.sliding_window_view(
-            np.pad(early, around, mode="edge"), around
-        )
-        before, after = (np.median(windows[long + 1 + k], axis=1) for k in (0, around))
-        lost[long + 1] = np.maximum(0.0, np.rint(after - before + lost[long + 1]))
-    return np.asarray(np.arange(len(stamps)) + np.cumsum(lost))
+    slope, start = np.polyfit(np.rint((stamps - start) / slope), stamps, 1)
+    return np.asarray(start + slope * np.rint((stamps - start) / slope))
