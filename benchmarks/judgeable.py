@@ -19,10 +19,14 @@ import numpy as np
 from pipelines import diagnose
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.errors import RrridError
-from pipelines.estimation.friction_terms import with_terms_told_apart
-from pipelines.estimation.judgements import Facts, JudgeableConfig, cannot_judge
-from pipelines.estimation.preparation import logs_of_roles, prepare
-from pipelines.estimation.repeated_states import facts, nominal_estimate
+from pipelines.estimation.judgements import (
+    Facts,
+    JudgeableConfig,
+    cannot_judge,
+    facts,
+    nominal_estimate,
+)
+from pipelines.estimation.preparation import logs_of_roles, prepare, with_terms_told_apart
 from pipelines.stage import Request
 
 _TIMES = (0.5, 1.0, 2.0)

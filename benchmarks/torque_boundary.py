@@ -26,8 +26,8 @@ import numpy.typing as npt
 
 from benchmarks.hidden_effects.table import wilson
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
-from pipelines.estimation.checks.config import BoundaryConfig
-from pipelines.estimation.checks.joint_rows import sample_motion
+from pipelines.estimation.checks.rows import sample_motion
+from pipelines.estimation.config import BoundaryConfig
 from pipelines.io.log import ExperimentLog, Signal
 from pipelines.io.robot import Joint, LinkParameters, RobotDescription, format_robot
 from pipelines.quality.subject import Subject

@@ -24,10 +24,15 @@ from pipelines.diagnosis.result import Diagnosis, Extended, Result
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.named_cause import refuse_unknown
 from pipelines.errors import Check, UsageError
-from pipelines.estimation.checks.gates import examined
+from pipelines.estimation.checks.plausibility import examined
 from pipelines.estimation.estimate import refuse_strange, refuse_unfit
-from pipelines.estimation.friction_terms import with_terms_told_apart
-from pipelines.estimation.preparation import BLOCKS, Logs, logs_of_roles, prepare
+from pipelines.estimation.preparation import (
+    BLOCKS,
+    Logs,
+    logs_of_roles,
+    prepare,
+    with_terms_told_apart,
+)
 from pipelines.io.model_file import read_model
 from pipelines.io.option import option
 from pipelines.report.diagnosis_report import diagnosis_report

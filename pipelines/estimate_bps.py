@@ -15,7 +15,7 @@ from pathlib import Path
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.parameter import Uncertainty
 from pipelines.errors import Check, NothingMatched, UsageError
-from pipelines.estimation.checks.gates import examined
+from pipelines.estimation.checks.plausibility import examined
 from pipelines.estimation.consistency import consistency
 from pipelines.estimation.estimate import (
     Fitted,
@@ -24,6 +24,7 @@ from pipelines.estimation.estimate import (
     fit_logs,
     judge,
     motions_of,
+    moving_rows,
     refuse_leak,
     refuse_strange,
     refuse_unfit,
@@ -31,11 +32,10 @@ from pipelines.estimation.estimate import (
 )
 from pipelines.estimation.identifiability import not_separated
 from pipelines.estimation.judgements import REMEDY, negative_viscous
-from pipelines.estimation.mean_period import averaged, doubts, residuals
 from pipelines.estimation.motion import Motions, Reconstruction, for_equations
 from pipelines.estimation.nominal import columns_in_words, fitted_arm, nominal_columns
+from pipelines.estimation.periods import averaged, doubts, residuals
 from pipelines.estimation.regression import Columns
-from pipelines.estimation.rests import moving_rows
 from pipelines.estimation.result import (
     Result,
     course,

@@ -22,7 +22,7 @@ from pipelines.dynamics.altered import carry_over
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.body import Array, Motion
 from pipelines.errors import Check, InputRejected, UsageError, did_you_mean
-from pipelines.estimation.links import Links, carried, consistent_links, prior_links
+from pipelines.estimation.consistency import Links, carried, consistent_links, prior_links
 from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.export.c_code import C
 from pipelines.export.card import Card, Consistency, LinkValue, Proof, Replay, card

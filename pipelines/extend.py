@@ -29,11 +29,16 @@ from pipelines.effects import find_effect
 from pipelines.effects.base import Effect
 from pipelines.errors import NothingMatched, UsageError
 from pipelines.estimation.candidate_columns import Wanted, place_of
-from pipelines.estimation.checks.gates import examined
+from pipelines.estimation.checks.plausibility import examined
 from pipelines.estimation.estimate import refuse_strange, refuse_unfit
-from pipelines.estimation.friction_terms import with_terms_told_apart
 from pipelines.estimation.motion import Motions, Reconstructed
-from pipelines.estimation.preparation import BLOCKS, Logs, logs_of_roles, prepare
+from pipelines.estimation.preparation import (
+    BLOCKS,
+    Logs,
+    logs_of_roles,
+    prepare,
+    with_terms_told_apart,
+)
 from pipelines.estimation.result import torques, validity
 from pipelines.io.files import write_log
 from pipelines.io.log import ExperimentLog, derive, digest_of, recording

@@ -183,8 +183,8 @@ def _periods(subject: Subject, opened: Opened) -> list[Check]:
     if not subject.sampled or log.period is None or not subject.good.runs:
         return []
     # observers, for the few logs that have periods
-    from pipelines.estimation.mean_period import doubts, mean_period
     from pipelines.estimation.motion import Reconstruction, reconstruct
+    from pipelines.estimation.periods import doubts, mean_period
     from pipelines.estimation.regression import cutoff_at, wanted_cutoff
 
     found = reconstruct(log, Reconstruction(), subject.good)

@@ -22,9 +22,9 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import Check, InputRejected, NothingMatched
-from pipelines.estimation.mean_period import doubts
 from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.estimation.motion_result import LogResult, ObserverResult, assess
+from pipelines.estimation.periods import doubts
 from pipelines.io.files import Opened, open_log, write_log
 from pipelines.io.log import Array, derive, recording
 from pipelines.io.robot import RobotDescription, format_robot

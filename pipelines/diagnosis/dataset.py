@@ -20,7 +20,7 @@ from pipelines.dynamics.arm import Arm
 from pipelines.errors import InputRejected
 from pipelines.estimation.exact_model import Exact, further_slopes, nominal_slopes
 from pipelines.estimation.joint_table import Array, Indices, Table, by_joint, in_rows
-from pipelines.estimation.nominal_fit import fit_columns, fit_nominal, rows_of
+from pipelines.estimation.nominal import fit_columns, fit_nominal, rows_of
 from pipelines.estimation.preparation import Prepared
 from pipelines.estimation.regression import Columns
 from pipelines.estimation.rows import Data, Kept, Whitening

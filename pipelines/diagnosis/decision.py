@@ -21,9 +21,14 @@ from pipelines.diagnosis.unnamed import in_words
 from pipelines.dynamics.arm import Arm
 from pipelines.estimation.bootstrap import chi2_bound
 from pipelines.estimation.joint_table import Array, in_rows
-from pipelines.estimation.judgements import cannot_judge, negative_viscous
+from pipelines.estimation.judgements import (
+    Repeated,
+    cannot_judge,
+    facts,
+    negative_viscous,
+    nominal_estimate,
+)
 from pipelines.estimation.preparation import Prepared
-from pipelines.estimation.repeated_states import Repeated, facts, nominal_estimate
 
 __all__ = ["Decision", "decide", "limited_by_estimate"]
 

@@ -33,9 +33,9 @@ from pipelines.diagnosis.trained import Standing, Trained, parameters, told
 from pipelines.dynamics.arm import Acting
 from pipelines.estimation.exact_model import Named
 from pipelines.estimation.joint_table import Array
+from pipelines.estimation.judgements import Repeated
 from pipelines.estimation.model_fit import Refined, TorqueGain, torque_gain_of
 from pipelines.estimation.preparation import Prepared
-from pipelines.estimation.repeated_states import Repeated
 from pipelines.estimation.residual_analysis import Proof, proof
 from pipelines.simulation.comparison import Simulation, simulation_errors
 

@@ -32,7 +32,7 @@ from pipelines.dynamics.body import Motion
 from pipelines.estimation.exact_model import Exact, Named, Which, slopes_of
 from pipelines.estimation.joint_table import Array, Arrow, Table
 from pipelines.estimation.model_fit import Refined, acting, with_uncertainty
-from pipelines.estimation.nominal_fit import rigid_rows
+from pipelines.estimation.nominal import rigid_rows
 from pipelines.estimation.preparation import Prepared
 from pipelines.estimation.rows import Data
 

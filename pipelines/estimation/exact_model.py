@@ -23,9 +23,9 @@ import numpy as np
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Motion
 from pipelines.effects.base import ArmModel, Effect, FrictionLaw, Quantity, adds
-from pipelines.estimation.nominal import arm_of
-from pipelines.estimation.nominal_fit import (
+from pipelines.estimation.nominal import (
     Fit,
+    arm_of,
     effect_rows,
     law_rows,
     law_slopes,

@@ -312,7 +312,8 @@ def _ticks(stamps: Array) -> Array:
     """
     steps = np.diff(stamps)
     excess = np.pad(steps / float(np.median(steps)) - 1.0, 1)
-    least = np.minimum(excess, np.minimum(excess + np.roll(excess, 1), excess + np.roll(excess, -1)))
+    either = np.minimum(np.roll(excess, 1), np.roll(excess, -1))
+    least = excess + np.minimum(either, 0.0)
     count = np.arange(len(stamps)) + np.cumsum(np.maximum(0.0, np.rint(least[:-1])))
     slope, start = np.polyfit(count, stamps, 1)
     if float(np.std(stamps - start - slope * count)) > _CONFIG.closest * slope:

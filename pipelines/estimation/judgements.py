@@ -3,29 +3,29 @@
     why = cannot_judge(facts)                  in words, with what to record; empty where they can
     for check in negative_viscous(found, where): ...
     for finding in excited(subject): ...       D09 of a log, by the equations of `estimate-bps`
+    common, differing = Repeated.of(data).parts(left)      what is noise, and what is not
 
-"No fault found" says that a model leaves no more torque than that of a healthy arm would. That
-takes a noise floor, from reference logs, or a model that leaves next to nothing on held-out motion
-but what differs between repeated periods; and a model that the logs determine. One that they do not
-determine predicts held-out torque with a large standard deviation:
+"No fault found" takes a noise floor, from reference logs, or a model that leaves next to nothing on
+held-out motion but what differs between repeated states; and a model that the logs determine. One
+that they do not determine predicts held-out torque with a large standard deviation:
 
     std τ̂_j(t) = sqrt(a_j(t)ᵀ C a_j(t)),  a_j the regressor of joint j, C the covariance of β
 
-(Draper & Smith 1998, ch. 3.1; C allows for autocorrelation). Misfit and standard deviation are both
-a share of the joint's torque, so that one number decides.
+(Draper & Smith 1998, ch. 3.1). Noise is what differs between two rows of one state: with a residual
+r = f(q, dq, ddq) + e of a model error f and noise e,
 
-Friction takes power, so a viscous coefficient below zero is no friction: the torque has the wrong
-sign, was compensated for friction, is late behind the motion, or the model lacks a law of friction
-whose torque falls with speed. It is reported where it is significant by the standard deviation that
-allows for autocorrelation, where the logs determine it, and where it stays so with a second Coulomb
-law of the widest change of sign: at speeds within that width, viscous friction only corrects the
-shape of the change.
+    E ¼ (r₁ - r₂)² = ½ σ²        E ¼ (r₁ + r₂)² = ½ σ² + f²
+
+(Rice 1984, difference-based variance). A viscous coefficient below zero is no friction. It is
+reported where it is significant, and stays so with a second Coulomb law of the widest change of
+sign: within that width viscous friction only corrects the shape of the change.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
@@ -33,12 +33,19 @@ from pipelines.effects import find_effect
 from pipelines.effects.base import everywhere
 from pipelines.errors import Check, InputRejected
 from pipelines.estimation import identifiability
-from pipelines.estimation.config import JudgeableConfig
+from pipelines.estimation.config import FitConfig, JudgeableConfig
 from pipelines.estimation.estimate import Estimate, Recipe, equations_of, estimate, with_cutoff
-from pipelines.estimation.least_squares import Block, Flags
+from pipelines.estimation.least_squares import Block, Flags, Indices
 from pipelines.estimation.motion import Reconstruction, reconstruct
-from pipelines.estimation.nominal import columns_in_words, nominal_columns
-from pipelines.estimation.regression import LogEquations
+from pipelines.estimation.nominal import (
+    columns_in_words,
+    fit_nominal,
+    nominal_columns,
+    with_offsets,
+)
+from pipelines.estimation.preparation import Prepared
+from pipelines.estimation.regression import Columns, LogEquations
+from pipelines.estimation.rows import Data
 from pipelines.io.log import Array, recording
 from pipelines.quality.subject import NotTested, Subject
 
@@ -211,3 +218,118 @@ def excitation(subject: Subject, still: Flags | None = None) -> Estimate:
     columns = nominal_columns(log.robot)
     motions = ((log, found),)
     return estimate(equations_of(motions, with_cutoff(Recipe(how), motions), columns), columns)
+
+
+_FIT = FitConfig()
+_NEIGHBOURS = 32  # numerics: that are looked at; slow motion has many next to it in time
+_OTHER_LOG = 1e9  # numerics: [s] between the clocks of two logs
+_FEWEST = 100  # numerics: pairs of a joint; fewer say little
+
+
+@dataclass(frozen=True, eq=False)
+class Repeated:
+    """Pairs of rows of one state; no row is in two of them."""
+
+    data: Data
+    first: Indices  # (pairs,) among the rows of all logs, one joint
+    second: Indices
+
+    @classmethod
+    def of(cls, data: Data) -> Repeated:
+        """Return the pairs, nearest first."""
+        logs = []
+        for one in data.logs:
+            m, still = one.motion, _FIT.alike
+            scaled = zip((m.q, m.dq, m.ddq), still, strict=True)
+            logs.append(np.hstack([one.at_rows(x) / least for x, least in scaled]))
+        log = np.repeat(np.arange(len(logs)), [len(own) for own in logs])
+        time = np.concatenate([one.t for one in data.logs]) + _OTHER_LOG * log
+        return cls(data, *nearest_pairs(np.vstack(logs), time, _FIT.near, _FIT.apart))
+
+    @property
+    def count(self) -> Array:
+        """(joints,) pairs that count."""
+        return np.asarray(self._counts.sum(axis=1), dtype=np.float64)
+
+    def parts(self, left: Array) -> tuple[Array, Array]:
+        """Return the mean squares of what pairs of a residual (rows,) share, and of the rest."""
+        laid = np.concatenate(list(self.data.split(left)), axis=1)  # (joints, rows of one)
+        one, other = laid[:, self.first], laid[:, self.second]
+        counts, number = self._counts, np.where(self.count < _FEWEST, np.nan, self.count)
+        common, differing = (
+            np.square(0.5 * x).sum(axis=1, where=counts) / number
+            for x in (one + other, one - other)
+        )
+        return common, differing
+
+    def noise(self, left: Array) -> Array:
+        """Return the variance (joints,) of a residual's noise; NaN of too few pairs."""
+        return 2.0 * self.parts(left)[1]
+
+    @property
+    def _counts(self) -> Flags:
+        """(joints, pairs)"""
+        weighed = np.concatenate([one.weighed for one in self.data.logs], axis=1)
+        return np.asarray(weighed[:, self.first] & weighed[:, self.second])
+
+
+def nearest_pairs(state: Array, time: Array, near: float, apart: float) -> tuple[Indices, Indices]:
+    """Return pairs of rows of one state, the nearest first; no row is in two of them.
+
+    Args:
+        state: (rows, coordinates), each in units of what is no motion of it.
+        time: (rows,) [s]
+        near: of the standard deviation of each coordinate, by which two rows may differ, or by a
+            unit.
+        apart: [s] between them, at least.
+    """
+    from scipy.spatial import cKDTree
+
+    if len(state) < 2:
+        return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
+    scaled, count = state / np.maximum(state.std(axis=0), 1.0 / near), len(state)
+    tree, most = cKDTree(scaled), min(_NEIGHBOURS, count)
+    distance, other = tree.query(scaled, most, p=np.inf, distance_upper_bound=near)
+    own, place = np.nonzero(np.isfinite(distance))
+    partner, away = other[own, place], distance[own, place]
+    kept = np.abs(time[own] - time[partner]) >= apart
+    own, partner, away = own[kept], partner[kept], away[kept]
+    free, chosen = np.ones(count, dtype=bool), []
+    for k in np.argsort(away, kind="stable"):
+        if free[own[k]] and free[partner[k]]:
+            free[[own[k], partner[k]]] = False
+            chosen.append(k)
+    return own[chosen], partner[chosen]
+
+
+def nominal_estimate(prepared: Prepared) -> Estimate:
+    """Return the nominal model as `estimate-bps` fits it, on prepared rows."""
+    return estimate(_equations(prepared.data, prepared.columns), prepared.columns)
+
+
+def facts(left: Array, known: bool, prepared: Prepared, estimated: Estimate) -> Facts:
+    """Return the errors of the nominal model on held-out motion, and the state of its floor.
+
+    Args:
+        left: (joints,) [N m] rms residual on held-out motion.
+        known: the floor, by reference logs.
+    """
+    data, columns = prepared.data, prepared.columns
+    judge = data if prepared.judge is None else prepared.judge
+    spread = predicted_std(estimated, chain.from_iterable(_equations(judge, columns)))
+    floor, confused = np.full(len(left), known), unresolved(estimated)
+    if not known:
+        # noise of the residual by rows of one state; 0 without any
+        _, fit = fit_nominal(data, columns)
+        noise = np.sqrt(np.nan_to_num(Repeated.of(data).noise(fit.left)))
+        # what is predicted is off by the noise and by the deviations of the model
+        floor = left <= _FIT.above * np.hypot(noise, spread)
+        if not confused:
+            offset = with_offsets(columns)
+            confused = one_way(estimate(_equations(data, offset), offset))
+    return Facts(left, judge.rms(judge.y), spread, confused, floor)
+
+
+def _equations(data: Data, columns: Columns) -> list[LogEquations]:
+    """Return the equations of each log in `columns`; rows may hold more terms of a friction law."""
+    return [replace(log.equations, columns=columns) for log in data.logs]

@@ -23,7 +23,7 @@ from pipelines.effects.base import Effect, FrictionLaw
 from pipelines.estimation.bootstrap import apart, difference
 from pipelines.estimation.exact_model import Exact, Which, slopes_of
 from pipelines.estimation.least_squares import Flags, Indices
-from pipelines.estimation.nominal_fit import rigid_rows
+from pipelines.estimation.nominal import rigid_rows
 from pipelines.estimation.rows import Data
 from pipelines.io.log import Array
 

@@ -9,13 +9,13 @@ import numpy as np
 from pipelines.estimation.config import MotionConfig
 from pipelines.estimation.filters import welch
 from pipelines.estimation.grids import Measured, lay_on, measured
-from pipelines.estimation.mean_period import NoiseFloor, mean_period
 from pipelines.estimation.motion import (
     Reconstructed,
     Reconstruction,
     encoder_resolution,
     tuned_observers,
 )
+from pipelines.estimation.periods import NoiseFloor, mean_period
 from pipelines.estimation.regression import cutoff_at, wanted_cutoff
 from pipelines.estimation.state_estimation import Observer
 from pipelines.estimation.tuning import innovations, smoother_bandwidth, whiteness

@@ -14,8 +14,8 @@ from pipelines.estimation.checks.boundary import Boundary
 from pipelines.estimation.consistency import Consistent
 from pipelines.estimation.estimate import Fitted
 from pipelines.estimation.filters import choose_decimation, zero_phase
-from pipelines.estimation.mean_period import PeriodicLog
 from pipelines.estimation.motion import Motions, Reconstructed, Reconstruction
+from pipelines.estimation.periods import PeriodicLog
 from pipelines.estimation.regression import bridged, cutoff_at
 from pipelines.io.log import Array, ExperimentLog, derive
 from pipelines.io.model_file import ModelFile, Validity

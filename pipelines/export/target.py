@@ -24,8 +24,7 @@ from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.kinematics import Placement
 from pipelines.effects import find_effect
-from pipelines.estimation.consistency import pseudo_inertia
-from pipelines.estimation.links import Links
+from pipelines.estimation.consistency import Links, pseudo_inertia
 from pipelines.export.config import EXPORT
 from pipelines.io.robot import RobotDescription
 from pipelines.io.urdf import chain_from_urdf

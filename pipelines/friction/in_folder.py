@@ -15,9 +15,9 @@ from collections.abc import Iterable, Sequence
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.parameter import Parameter
 from pipelines.estimation.estimate import Fitted, Recipe, fit_logs, motions_of, with_cutoff
-from pipelines.estimation.mean_period import averaged
 from pipelines.estimation.motion import Motions, Reconstruction, reconstruct
 from pipelines.estimation.nominal import fitted_arm, nominal_columns
+from pipelines.estimation.periods import averaged
 from pipelines.friction.config import FolderConfig
 from pipelines.friction.joint import JointLogs, fit_joint, friction_of
 from pipelines.friction.laws import law_named

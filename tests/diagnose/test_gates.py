@@ -13,7 +13,7 @@ import pytest
 
 from pipelines import diagnose
 from pipelines.errors import InputRejected, NothingMatched
-from pipelines.estimation.checks.gates import examined
+from pipelines.estimation.checks.plausibility import examined
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.stage import Request, run_stage
 from tests.diagnose.sessions import session, written

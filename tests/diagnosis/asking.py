@@ -13,8 +13,7 @@ from pipelines.diagnosis.result import Diagnosis as Answer
 from pipelines.diagnosis.result import Extended
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.estimation.candidate_columns import Wanted
-from pipelines.estimation.friction_terms import with_terms_told_apart
-from pipelines.estimation.preparation import BLOCKS, Logs, Prepared, prepare
+from pipelines.estimation.preparation import BLOCKS, Logs, Prepared, prepare, with_terms_told_apart
 from pipelines.io.log import ExperimentLog
 
 __all__ = ["answered", "before", "causes", "diagnosed", "effects", "extended", "prepared_for"]

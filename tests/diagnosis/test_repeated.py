@@ -13,8 +13,8 @@ from pipelines.diagnosis.findings import weigh
 from pipelines.diagnosis.trained import Standing, train
 from pipelines.effects import effect_names
 from pipelines.estimation.estimate import Recipe
+from pipelines.estimation.judgements import Repeated
 from pipelines.estimation.preparation import Logs, prepare
-from pipelines.estimation.repeated_states import Repeated
 from pipelines.estimation.rows import Data
 from pipelines.io.log import Array, ExperimentLog
 from tests.diagnosis.arms import hidden

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipelines.estimate_bps import Result, compute
-from pipelines.estimation.mean_period import PeriodicLog
+from pipelines.estimation.periods import PeriodicLog
 from pipelines.io.files import Opened
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.report.bps_report import bps_report

@@ -8,7 +8,7 @@ import pytest
 from benchmarks.other_plants.drawn import drawn
 from benchmarks.torque_boundary import KINDS, judged
 from pipelines.estimation.checks.boundary import torque_boundary, touches_of_zero
-from pipelines.estimation.checks.config import BoundaryConfig
+from pipelines.estimation.config import BoundaryConfig
 from tests.seeds import rarely, usually
 
 SEEDS = (pytest.param(103, marks=pytest.mark.slow), 108)

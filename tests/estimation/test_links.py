@@ -10,8 +10,12 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.arm import Arm
-from pipelines.estimation.consistency import physical_consistency, pseudo_inertia
-from pipelines.estimation.links import consistent_links, prior_links
+from pipelines.estimation.consistency import (
+    consistent_links,
+    physical_consistency,
+    prior_links,
+    pseudo_inertia,
+)
 from pipelines.io.robot import Joint, LinkParameters, RobotDescription
 from pipelines.io.robot_files import load_robot
 from pipelines.io.urdf import import_urdf

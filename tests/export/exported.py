@@ -11,7 +11,7 @@ from pipelines.dynamics.body import Motion
 from pipelines.dynamics.parameter import Parameter
 from pipelines.dynamics.rrr import rigid_body
 from pipelines.effects import find_effect
-from pipelines.estimation.links import Links, consistent_links
+from pipelines.estimation.consistency import Links, consistent_links
 from pipelines.export.states import course
 from pipelines.export.target import Held, Target, folded, held_by
 from pipelines.export_model import TARGETS

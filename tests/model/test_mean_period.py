@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.estimation.mean_period import doubts, mean_period
 from pipelines.estimation.motion import Reconstruction, reconstruct
-from pipelines.estimation.periods import Periods
+from pipelines.estimation.periods import Periods, doubts, mean_period
 from pipelines.io.log import Array, ExperimentLog
 from tests.healthy import with_signal
 from tests.model.estimation.experiments import motion_of, one_period, periodic

@@ -12,9 +12,14 @@ from pipelines import estimate_bps
 from pipelines.dynamics.rrr import rigid_body
 from pipelines.estimation.checks import plausibility as plausibility_module
 from pipelines.estimation.checks.boundary import boundary_findings, torque_boundary
-from pipelines.estimation.checks.clock_offset import Offset, clock_offset
-from pipelines.estimation.checks.joint_rows import sample_motion
-from pipelines.estimation.checks.plausibility import Evidence, plausibility, plausibility_findings
+from pipelines.estimation.checks.plausibility import (
+    Evidence,
+    Offset,
+    clock_offset,
+    plausibility,
+    plausibility_findings,
+)
+from pipelines.estimation.checks.rows import sample_motion
 from pipelines.estimation.judgements import excitation
 from pipelines.io.files import Opened, open_log
 from pipelines.io.log import Array, ExperimentLog

@@ -17,12 +17,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.estimation.checks.channel_order import ColumnOrder, search_orders
-from pipelines.estimation.checks.config import BoundaryConfig
-from pipelines.estimation.checks.gravity_fit import GravityFit, GravityModel
-from pipelines.estimation.checks.joint_rows import Sampled, sample_motion
-from pipelines.estimation.checks.torque_rows import Array, GenericArm, generic_arm, torque_rows
-from pipelines.io.log import ExperimentLog
+from pipelines.estimation.checks.gravity_fit import (
+    ColumnOrder,
+    GravityFit,
+    GravityModel,
+    search_orders,
+)
+from pipelines.estimation.checks.rows import (
+    GenericArm,
+    Sampled,
+    generic_arm,
+    sample_motion,
+    torque_rows,
+)
+from pipelines.estimation.config import BoundaryConfig
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.quality.segments import Usable
 from pipelines.quality.subject import Subject
 

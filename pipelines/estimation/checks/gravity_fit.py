@@ -1,4 +1,4 @@
-"""Fit the gravity vector of the base by variable projection, with an honest spread.
+"""Fit the gravity vector of the base, with an honest spread; find the order of the columns.
 
     min over a, φ, f of  Σ_j ν_j/2 log mean (τ_j - (Y_0j + Σ_k a_k Y_kj) φ - F_j f_j)²
 
@@ -6,20 +6,22 @@ Joints have unknown noise, so the likelihood is concentrated in it. What a joint
 projected out once (Frisch & Waugh 1933); φ is projected out at every a (Golub & Pereyra 1973),
 with Kaufman's Jacobian. Everything is made of one Gram matrix a joint. The residual is correlated
 and partly an error of the model, so the spread is the jackknife over clusters of moments (Bell &
-McCaffrey 2002):
-
-    Cov = (G-1)/G Σ_b (θ_-b - θ)(θ_-b - θ)ᵀ        θ_-b: the fit without cluster b
+McCaffrey 2002). Every order of columns is scored by the same likelihood, under the described
+gravity.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import pairwise
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, pairwise
 
 import numpy as np
 
-from pipelines.estimation.checks.config import BoundaryConfig
-from pipelines.estimation.checks.torque_rows import Array, TorqueRows
+from pipelines.dynamics.chain import regressor
+from pipelines.estimation.checks.rows import GenericArm, RowFilter, Sampled, TorqueRows, own_columns
+from pipelines.estimation.config import BoundaryConfig
+from pipelines.io.log import Array
 
 _RIDGE = 1e-9  # numerics: of equilibrated columns
 _STEPS = 30  # numerics
@@ -239,3 +241,127 @@ def _ridge(normal: Array) -> Array:
     where all are zero.
     """
     return _RIDGE * max(float(np.trace(normal)) / len(normal), 1.0) * np.eye(len(normal))
+
+
+Order = tuple[int, ...]
+_SIGNALS = ("q and tau", "tau", "q")
+_BEAM = 8  # numerics: orders that are kept at each exchange
+_REWEIGHTED = 4  # numerics: of reweighting, from what each joint by itself leaves
+
+
+@dataclass(frozen=True)
+class ColumnOrder:
+    """Joint j takes column order[j] of the log, of the signals named."""
+
+    signal: str  # "q and tau", "q" or "tau"
+    order: Order
+
+    @property
+    def q(self) -> Order:
+        """The order of the positions."""
+        return self.order if "q" in self.signal else tuple(range(len(self.order)))
+
+    @property
+    def tau(self) -> Order:
+        """The order of the torques."""
+        return self.order if "tau" in self.signal else tuple(range(len(self.order)))
+
+    @property
+    def listed(self) -> str:
+        return ",".join(str(k + 1) for k in self.order)
+
+
+def search_orders(
+    arm: GenericArm,
+    motion: Sampled,
+    gravity: Array,
+    moving: Sequence[int],
+    logged: GravityFit,
+    config: BoundaryConfig,
+) -> tuple[ColumnOrder, ...]:
+    """Return the best orders other than the logged one, best first.
+
+    Orders are reached by exchanges of two columns, from the best ones at each exchange.
+
+    Args:
+        gravity: (3,) [m/s^2] under which orders are compared.
+        moving: joints that move; the others keep their place.
+        logged: the best fit of the columns as they are.
+    """
+    explained = logged.residual.max() < config.suspect
+    # go on where no exchange fits better than the log
+    every = logged.rms > config.lost or (len(moving) <= config.few and not explained)
+    least = -0.5 * float(np.sum(np.log(logged.variance))) - len(logged.variance)  # hopeless below
+    score = _scorer(arm, motion.every(max(1, len(motion.t) // config.order_rows)), gravity, config)
+    same: Order = tuple(range(len(arm.chain.revolute)))
+    scores: dict[ColumnOrder, float] = {}
+    for signal in _SIGNALS[:1] if explained else _SIGNALS:
+        own = {same: score(ColumnOrder(signal, same))}
+        beam: list[Order] = []
+        for _ in range(len(moving) - 1):
+            best = sorted(own, key=lambda order: -own[order])[:_BEAM]
+            if best == beam or (beam and best[0] == same and not every):
+                break
+            beam = best
+            near = {_exchanged(order, a, b) for order in beam for a, b in combinations(moving, 2)}
+            own |= {order: score(ColumnOrder(signal, order)) for order in near - own.keys()}
+        scores |= {ColumnOrder(signal, order): x for order, x in own.items() if order != same}
+    ranked = sorted(scores.items(), key=lambda item: -item[1])[: config.orders]
+    return tuple(order for order, x in ranked if x > least)
+
+
+def _exchanged(order: Order, a: int, b: int) -> Order:
+    swapped = list(order)
+    swapped[a], swapped[b] = order[b], order[a]
+    return tuple(swapped)
+
+
+def _scorer(
+    arm: GenericArm, motion: Sampled, gravity: Array, config: BoundaryConfig
+) -> Callable[[ColumnOrder], float]:
+    """Return the log likelihood a moment of an order."""
+    chain, smooth = replace(arm.chain, gravity=gravity), RowFilter([motion])
+    error = config.model_error**2
+    own = smooth(own_columns(motion.dq, motion.ddq, motion.coulomb))
+    torque = smooth(motion.tau.T[:, :, None])[:, :, 0].T
+    sizes = np.maximum(np.std(torque, axis=0), 1e-12)
+    own /= np.maximum(np.linalg.norm(own, axis=1, keepdims=True), 1e-300)
+    basis = np.linalg.qr(own)[0]  # of each column of the positions
+    # torque (n, N, n) less what each column's own explains
+    tau = torque - basis @ (basis.transpose(0, 2, 1) @ torque)
+    rows: dict[Order, tuple[Array, Array]] = {}
+
+    def rows_of(order: Order) -> tuple[Array, Array]:
+        """Return Gram matrices (n, p, p) and products with every torque (n, p, n) of positions."""
+        if order not in rows:
+            at = list(order)
+            y = regressor(chain, motion.q[:, at], motion.dq[:, at], motion.ddq[:, at], arm.columns)
+            columns = smooth(y.transpose(1, 0, 2))
+            columns = columns - basis[at] @ (basis[at].transpose(0, 2, 1) @ columns)
+            turned = columns.transpose(0, 2, 1) / columns.shape[1]
+            rows[order] = turned @ columns, turned @ tau[at]
+        return rows[order]
+
+    def score(one: ColumnOrder) -> float:
+        gram, cross = rows_of(one.q)
+        joints, torques = np.arange(len(one.order)), list(one.tau)
+        size = sizes[torques]
+        total = np.mean(tau[list(one.q), :, torques] ** 2, axis=1) / size**2
+        gram = gram / size[:, None, None] ** 2
+        right = cross[joints, :, torques] / size[:, None] ** 2
+        scale = np.sqrt(np.maximum(np.einsum("jpp->p", gram), 1e-300))
+        scale[scale < 1e-10 * scale.max()] = np.inf
+        gram, right = gram / np.outer(scale, scale), right / scale
+        count = gram.shape[1]
+        ridge = 1e-6 * np.eye(count) * np.einsum("jpp->j", gram)[:, None, None] / count
+        alone = np.linalg.solve(gram + ridge, right[:, :, None])[:, :, 0]  # each joint by itself
+        variance = np.maximum(total - np.sum(right * alone, axis=1), 0.0) + error
+        for _ in range(_REWEIGHTED):
+            normal = np.tensordot(1.0 / variance, gram, 1)
+            normal += _RIDGE * np.trace(normal) / count * np.eye(count)
+            phi = np.linalg.solve(normal, right.T @ (1.0 / variance))
+            rest = total - 2.0 * right @ phi + gram @ phi @ phi
+            variance = np.maximum(rest, 0.0) + error
+        return -0.5 * float(np.sum(np.log(variance)))
+
+    return score

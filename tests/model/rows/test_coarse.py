@@ -6,8 +6,7 @@ import numpy as np
 
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.estimation.candidate_columns import families, lay_family, whole_motion
-from pipelines.estimation.nominal import arm_of
-from pipelines.estimation.nominal_fit import fit_nominal
+from pipelines.estimation.nominal import arm_of, fit_nominal
 from pipelines.estimation.preparation import Logs, prepare
 from tests.diagnosis.arms import hidden
 

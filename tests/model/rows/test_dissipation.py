@@ -9,7 +9,7 @@ from pipelines.effects.friction import Coulomb, TorqueOffset, Viscous
 from pipelines.estimation.estimate import Recipe
 from pipelines.estimation.exact_model import Exact
 from pipelines.estimation.model_fit import Refined, dissipating, driving, refine
-from pipelines.estimation.nominal_fit import fit_nominal
+from pipelines.estimation.nominal import fit_nominal
 from pipelines.estimation.preparation import Logs, prepare
 from tests.diagnosis.rotor import turned
 

@@ -12,7 +12,7 @@ from pipelines.effects import all_effects, find_effect
 from pipelines.effects.base import Effect, adds
 from pipelines.estimation.estimate import Recipe
 from pipelines.estimation.exact_model import Exact
-from pipelines.estimation.nominal_fit import fit_nominal
+from pipelines.estimation.nominal import fit_nominal
 from pipelines.estimation.preparation import Logs, Prepared, prepare
 from tests.diagnosis.arms import hidden
 from tests.effects.test_every_effect import drawn, placed

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipelines.estimation.estimate import Recipe
-from pipelines.estimation.nominal_fit import fit_columns, fit_nominal, rows_of
+from pipelines.estimation.nominal import fit_columns, fit_nominal, rows_of
 from pipelines.estimation.preparation import Logs, prepare
 from pipelines.io.files import open_log
 from sample_logs.make_model import synthetic_arm

@@ -8,7 +8,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from pipelines.dynamics.body import Motion
 from pipelines.estimation.estimate import Recipe
-from pipelines.estimation.nominal_fit import _orthonormal, fit_nominal, rows_of
+from pipelines.estimation.nominal import _orthonormal, fit_nominal, rows_of
 from pipelines.estimation.preparation import Logs, Prepared, prepare
 from pipelines.estimation.rows import Data
 from tests.diagnosis.arms import arm, hidden

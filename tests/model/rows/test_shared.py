@@ -10,7 +10,7 @@ from pipelines.effects import find_effect
 from pipelines.estimation.estimate import Recipe
 from pipelines.estimation.exact_model import Exact
 from pipelines.estimation.model_fit import refine
-from pipelines.estimation.nominal_fit import fit_nominal
+from pipelines.estimation.nominal import fit_nominal
 from pipelines.estimation.preparation import Logs, Prepared, prepare
 from tests.diagnosis.arms import hidden
 

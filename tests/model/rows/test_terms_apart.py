@@ -19,10 +19,16 @@ from pipelines.effects.friction import Coulomb, ThreeSigmoid, TwoSigmoid, Viscou
 from pipelines.estimation.candidate_columns import Wanted
 from pipelines.estimation.estimate import Recipe
 from pipelines.estimation.exact_model import Exact
-from pipelines.estimation.friction_terms import unclear, with_terms_told_apart
 from pipelines.estimation.model_fit import Refined, refine
-from pipelines.estimation.nominal_fit import fit_nominal
-from pipelines.estimation.preparation import BLOCKS, Logs, Prepared, prepare
+from pipelines.estimation.nominal import fit_nominal
+from pipelines.estimation.preparation import (
+    BLOCKS,
+    Logs,
+    Prepared,
+    prepare,
+    unclear,
+    with_terms_told_apart,
+)
 from pipelines.io.files import open_log
 from pipelines.io.log import Array
 from sample_logs.make_model import synthetic_arm

@@ -21,7 +21,7 @@ from pipelines.effects.friction import Coulomb, ViscousDrift
 from pipelines.estimation.estimate import Recipe
 from pipelines.estimation.exact_model import Exact, nominal_slopes, slopes_of
 from pipelines.estimation.model_fit import refine
-from pipelines.estimation.nominal_fit import fit_nominal, rigid_rows
+from pipelines.estimation.nominal import fit_nominal, rigid_rows
 from pipelines.estimation.preparation import Logs, prepare
 from pipelines.io.log import Array
 from tests.diagnose.sessions import but
