@@ -7,9 +7,9 @@ Both take position and torque of one joint, 20 s at 1 kHz, friction of three sig
 inertia, gravity and friction (ten numbers). Theirs is the paper's filter: filterpy's
 ExtendedKalmanFilter over q, dq and the ten, one pass, started 15 % off the truth and given the true
 noise of torque and encoder; its model and derivatives are plain scalar arithmetic, faster than
-arrays of one. Ours is one call, `fit_driven_alone`, and is given neither, nor a start: only the
-step of the encoder. It tunes a smoother, fits roughly, refines the motion about that once (by
-default) or twice, fits again and gives the covariance. Errors are of the friction curve over the
+arrays of one. Ours is what `rrrid fit-friction` does with a given law, and is given neither, nor a
+start: only the step of the encoder. It smooths the motion, fits, refines the motion about that once
+or twice, fits again and gives the covariance. Errors are of the friction curve over the
 driven speeds, rms over its rms, medians over the seeds.
 """
 
@@ -25,9 +25,11 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.textbook_kalman import ExtendedTextbook
-from pipelines.friction.fit import LawFit
+from pipelines.estimation.motion import Reconstruction, reconstruct
+from pipelines.friction.fit import Equations, LawFit, fit_law
+from pipelines.friction.joint import refined
 from pipelines.friction.laws import OneJoint, law_named
-from pipelines.friction.refine import fit_driven_alone
+from pipelines.friction.weak_form import stretches_of
 from tests.friction.one_joint import (
     ENCODER,
     INERTIA,
@@ -35,6 +37,7 @@ from tests.friction.one_joint import (
     SINE,
     STEP,
     TRUTHS,
+    as_log,
     driven_speeds,
     recorded,
     relative,
@@ -44,7 +47,7 @@ PARTS = 2  # midpoint steps a sample
 CONSTANT = 11  # place of c'
 Advance = Callable[[np.ndarray, float], tuple[np.ndarray, np.ndarray]]
 
-ROUNDS = {"one call": 1, "refined twice": 2}
+ROUNDS = {"refined once": 1, "refined twice": 2}
 STATES = np.array([0.0, 0.0, 1.0 / INERTIA, SINE, 0.4, 1.2, -0.4, 120.0, 60.0, 12.0, 0.12, 0.35])
 STD = np.array([ENCODER, 0.01, 2.0, 0.4, 0.3, 0.4, 0.2, 30.0, 20.0, 5.0, 0.05, 0.2])
 
@@ -53,8 +56,9 @@ def joint_step(step: float) -> Advance:
     """Return one sample of eq. (11) and (10) by midpoint steps, with its derivatives."""
     h = step / PARTS
 
-    def acceleration(x: list[float], q: float, v: float,
-                     u: float) -> tuple[float, float, float, list[float]]:
+    def acceleration(
+        x: list[float], q: float, v: float, u: float
+    ) -> tuple[float, float, float, list[float]]:
         """Return a, ∂a/∂q, ∂a/∂v, and ∂a/∂ of the constants."""
         theta, c, f1, f2, f3, w1, w2, w3, b = x[2:11]
         d = x[CONSTANT] if len(x) > CONSTANT else 0.0
@@ -62,10 +66,24 @@ def joint_step(step: float) -> Advance:
         t1, t2, t3 = math.tanh(w1 * v), math.tanh(w2 * v), math.tanh(w3 * v)
         e1, e2, e3 = 1.0 - t1 * t1, 1.0 - t2 * t2, 1.0 - t3 * t3
         rest = u - c * s - d * o - f1 * t1 - f2 * t2 - f3 * t3 - b * v
-        own = [rest, -theta * s, -theta * t1, -theta * t2, -theta * t3, -theta * f1 * e1 * v,
-               -theta * f2 * e2 * v, -theta * f3 * e3 * v, -theta * v, -theta * o]
-        return (theta * rest, theta * (d * s - c * o),
-                -theta * (f1 * w1 * e1 + f2 * w2 * e2 + f3 * w3 * e3 + b), own[:len(x) - 2])
+        own = [
+            rest,
+            -theta * s,
+            -theta * t1,
+            -theta * t2,
+            -theta * t3,
+            -theta * f1 * e1 * v,
+            -theta * f2 * e2 * v,
+            -theta * f3 * e3 * v,
+            -theta * v,
+            -theta * o,
+        ]
+        return (
+            theta * rest,
+            theta * (d * s - c * o),
+            -theta * (f1 * w1 * e1 + f2 * w2 * e2 + f3 * w3 * e3 + b),
+            own[: len(x) - 2],
+        )
 
     def advance(x: np.ndarray, u: float) -> tuple[np.ndarray, np.ndarray]:
         values = x.tolist()
@@ -87,11 +105,14 @@ def joint_step(step: float) -> Advance:
 
 
 def ours(y: np.ndarray, tau: np.ndarray, rounds: int) -> LawFit:
-    joint, law = OneJoint.of(recorded("three_sigmoid", 0).robot, JOINT), law_named("three_sigmoid")
-    assert law is not None
-    return fit_driven_alone(
-        np.arange(len(y), dtype=np.float64) * STEP, y, tau, joint, law, ENCODER, rounds=rounds
-    )
+    log, law = as_log(y, tau, "joint"), law_named("three_sigmoid")
+    joint = OneJoint.of(log.robot, JOINT)
+    stretches = stretches_of(log, JOINT, reconstruct(log, Reconstruction()), 0.02)
+    fit = fit_law(Equations(stretches, joint), law)
+    for _ in range(rounds):
+        stretches = tuple(refined(stretch, fit, ENCODER) for stretch in stretches)
+        fit = fit_law(Equations(stretches, joint), law, [fit.theta])
+    return fit
 
 
 def theirs(y: np.ndarray, tau: np.ndarray) -> np.ndarray:

@@ -28,7 +28,7 @@ from bench.plant import record
 from pipelines.dynamics.arm import Arm
 from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.estimation.result import torques
-from pipelines.friction.in_folder import fitted_in_folder
+from pipelines.friction.several import fitted_in_folder
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.writing.control_cases import tip_std
 from pipelines.writing.task import writing_task

@@ -24,9 +24,9 @@ from pipelines.estimation.estimate import Recipe
 from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.estimation.nominal import fitted_arm
 from pipelines.estimation.result import validity
-from pipelines.friction.config import FolderConfig
+from pipelines.friction.config import FRICTION
 from pipelines.friction.findings import findings_of, misfits
-from pipelines.friction.joint import JointFit, JointLogs, Seen, fit_joint, friction_of
+from pipelines.friction.joint import JointFit, Seen, fit_joint, friction_of, logs_by_joint
 from pipelines.friction.laws import LADDER, Law, law_named
 from pipelines.friction.result import Result, joint_result, several_results
 from pipelines.friction.several import fit_several
@@ -54,7 +54,7 @@ class Settings:
     law: str | None = option(
         None, "Law to fit, as the report names it. [the simplest that is not worse]"
     )
-    window: float = option(FolderConfig.window, "Windows of the equations [s], the shortest.")
+    window: float = option(FRICTION.window, "Windows of the equations [s], the shortest.")
     order: int = Reconstruction.order  # of the smoother that motion begins with
     together: bool = True  # where no joint was driven alone: friction with the base parameters
 
@@ -88,7 +88,9 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         )
     used = [log for log in logs if log.role in ("identify", "validate")]
     seen, checks = _examined(used, Reconstruction(order=settings.order))
-    joints = [fit_joint(part, settings.window, law) for part in _by_joint(seen)]
+    parts, elsewhere = logs_by_joint(seen)
+    checks += elsewhere
+    joints = [fit_joint(part, settings.window, law) for part in parts]
     robot = identify[0].robot
     results = tuple(
         joint_result(joint, robot.joints[joint.logs.joint - 1].name) for joint in joints
@@ -182,18 +184,6 @@ def _examined(logs: Sequence[ExperimentLog], how: Reconstruction) -> tuple[list[
         checks += accepted(subject)
         seen.append((log, reconstruct(log, how, subject.good)))
     return seen, checks
-
-
-def _by_joint(seen: Sequence[Seen]) -> list[JointLogs]:
-    parts: dict[tuple[int, str], list[Seen]] = {}
-    for pair in seen:
-        if pair[0].joint is not None:
-            parts.setdefault((pair[0].joint, pair[0].role), []).append(pair)
-    return [
-        JointLogs(joint, tuple(own), tuple(parts.get((joint, "validate"), ())))
-        for (joint, role), own in sorted(parts.items())
-        if role == "identify"
-    ]
 
 
 def _arm(log: ExperimentLog, joints: Sequence[JointFit]) -> Arm:

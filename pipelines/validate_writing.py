@@ -22,7 +22,7 @@ from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
 from pipelines.estimation.estimate import refuse_leak
 from pipelines.estimation.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.estimation.result import of_this_robot, torques, with_torques
-from pipelines.friction.in_folder import fitted_in_folder
+from pipelines.friction.several import fitted_in_folder
 from pipelines.importers.controller import controller_table, write_controller_table
 from pipelines.importers.recipe import Recipe
 from pipelines.io.files import write_log

@@ -30,8 +30,8 @@ from pipelines.effects import find_effect
 from pipelines.effects.base import ArmModel, Effect, Quantity, SpeedCurve
 from pipelines.io.robot import Joint, RobotDescription
 
-__all__ = ["LADDER", "Law", "NonlinearNumber", "OneJoint", "gravity_acts", "gravity_columns",
-           "gravity_names", "law_named", "with_further"]
+__all__ = ["LADDER", "Law", "OneJoint", "gravity_acts", "gravity_columns", "gravity_names"]
+__all__ += ["law_named"]
 
 POSITIONS = 8  # numerics: of the driven joint, at which gravity is computed
 PARALLEL = 1e-6  # numerics: [rad] between axis and gravity: rounding of a description
@@ -48,16 +48,19 @@ class OneJoint:
     gravity: tuple[float, ...]  # c, c' [N m]; prismatic: the weight along the axis [N]
 
     @classmethod
-    def of(cls, whole: RobotDescription, joint: int, inertia: float = 0.0,
-           gravity: tuple[float, ...] = ()) -> OneJoint:
+    def of(
+        cls,
+        whole: RobotDescription,
+        joint: int,
+        inertia: float = 0.0,
+        gravity: tuple[float, ...] = (),
+    ) -> OneJoint:
         """Return joint `joint`, counted from 1, of a robot."""
         own = whole.joints[joint - 1]
         alone = RobotDescription(whole.name, whole.gravity, "dh", (Joint(own.name, own.type),))
         return cls(alone, inertia, gravity or (0.0,) * len(gravity_names(own.revolute)))
 
-    @property
-    def n_joints(self) -> int:
-        return 1
+    n_joints = 1
 
     @property
     def revolute(self) -> bool:
@@ -92,8 +95,8 @@ class OneJoint:
         raise TypeError("a joint on its own has no links")
 
     def carrying(self, rigid: Array) -> OneJoint:
-        """Return it with J, c, c' (3,) [kg m^2], [N m]; prismatic: mass and weight (2,)."""
-        inertia, *gravity = map(float, rigid[:1 + len(self.gravity)])
+        """Return it with J, c, c' (3, …) [kg m^2], [N m]; prismatic: mass and weight (2, …)."""
+        inertia, *gravity = map(float, rigid[: 1 + len(self.gravity)])
         return replace(self, inertia=inertia, gravity=tuple(gravity))
 
 
@@ -121,15 +124,6 @@ def gravity_acts(robot: RobotDescription, joint: int, others: Sequence[float]) -
 
 
 @dataclass(frozen=True)
-class NonlinearNumber:
-    """One number of θ, which several effects may share."""
-
-    name: str
-    effects: tuple[int, ...]  # of the law
-    quantity: Quantity
-
-
-@dataclass(frozen=True)
 class Law:
     """Effects at one joint that together are its friction."""
 
@@ -147,20 +141,19 @@ class Law:
         return " + ".join(find_effect(name).words.title for name in self.name.split("+"))
 
     @cached_property
-    def nonlinear(self) -> tuple[NonlinearNumber, ...]:
-        """Return the numbers of θ.
+    def nonlinear(self) -> tuple[tuple[Quantity, tuple[int, ...]], ...]:
+        """Return the numbers of θ, each with the effects that have it.
 
         One that may be zero, such as a damping, stays at its default: it has no logarithm. So does
         one that a model need not give, which only other forms of the law have.
         """
-        numbers: dict[str, NonlinearNumber] = {}
+        numbers: dict[str, tuple[Quantity, tuple[int, ...]]] = {}
         for k, effect in enumerate(self.effects):
             for q in effect.parameters:
-                if not q.shape or q.low <= 0.0 or q.unsaid is not None:
-                    continue
-                key = q.name if q.name == _SHARED else f"{effect.name}.{q.name}"
-                before = numbers.get(key, NonlinearNumber(q.name, (), q))
-                numbers[key] = NonlinearNumber(q.name, (*before.effects, k), q)
+                if q.shape and q.low > 0.0 and q.unsaid is None:
+                    key = q.name if q.name == _SHARED else f"{effect.name}.{q.name}"
+                    first, before = numbers.get(key, (q, ()))
+                    numbers[key] = first, (*before, k)
         return tuple(numbers.values())
 
     @cached_property
@@ -185,8 +178,8 @@ class Law:
     @cached_property
     def pointwise(self) -> bool:
         """Return whether its torque at a moment depends on that moment alone, unlike presliding."""
-        return all(effect.own_memory(effect.values(np.ones(count))) is None
-                   for effect, count in zip(self.effects, self._counts, strict=True))
+        pairs = zip(self.effects, self._counts, strict=True)
+        return all(one.own_memory(one.values(np.ones(count))) is None for one, count in pairs)
 
     @cached_property
     def sees_load(self) -> bool:
@@ -195,32 +188,29 @@ class Law:
 
     @cached_property
     def sloped(self) -> bool:
-        """Return whether `slopes` is known."""
-        still = np.zeros((1, 1))
-        motion = Motion(np.zeros(1), still, still, still)
-        theta = np.mean(self.bounds, axis=0)
-        return self.slopes(motion, theta, np.ones(self.amplitudes)) is not None
+        """Return whether `slopes` is known: of every effect that has a number of θ."""
+        curved = {k for _, effects in self.nonlinear for k in effects}
+        kinds = [type(self.effects[k]) for k in curved]
+        return all(kind.shape_slopes is not Effect.shape_slopes for kind in kinds)
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Return the lower and the upper bounds of θ."""
-        pairs = [(number.quantity.low, number.quantity.high) for number in self.nonlinear]
-        low, high = np.log(pairs).reshape(-1, 2).T
+        low, high = np.log([(q.low, q.high) for q, _ in self.nonlinear]).reshape(-1, 2).T
         return low, high
 
     def shaped(self, theta: Array) -> tuple[Effect, ...]:
         """Return the effects with their non-linear numbers out of θ."""
         values: list[dict[str, Any]] = [{} for _ in self.effects]
-        for number, logarithm in zip(self.nonlinear, theta, strict=True):
-            for k in number.effects:
-                values[k][number.name] = math.exp(logarithm)
-        return tuple(replace(effect, **own) if own else effect
-                     for effect, own in zip(self.effects, values, strict=True))
+        for (quantity, effects), logarithm in zip(self.nonlinear, theta, strict=True):
+            for k in effects:
+                values[k][quantity.name] = math.exp(logarithm)
+        pairs = zip(self.effects, values, strict=True)
+        return tuple(replace(effect, **own) if own else effect for effect, own in pairs)
 
     def theta(self, effects: Sequence[Effect]) -> Array:
         """Return θ of effects; the inverse of `shaped`."""
-        return np.array([math.log(getattr(effects[number.effects[0]], number.name))
-                         for number in self.nonlinear])
+        return np.array([math.log(getattr(effects[k], q.name)) for q, (k, *_) in self.nonlinear])
 
     def canonical(self, theta: Array) -> Array:
         """Return, of several equal θ, that in the order of its effects, such as w1 > w2 > w3."""
@@ -236,28 +226,33 @@ class Law:
         parts = [effect.columns(motion, arm)[:, 0] for effect in self.shaped(theta)]
         return np.hstack(parts) if len(parts) > 1 else parts[0]
 
-    def slopes(self, motion: Motion, theta: Array, amplitudes: Array) -> Array | None:
-        """Return ∂τ/∂θ (samples, numbers of θ); None where an effect has no closed form of it."""
-        total, parts = np.zeros((len(self.nonlinear), len(motion.dq))), self._split(amplitudes)
-        for k, (effect, part) in enumerate(zip(self.shaped(theta), parts, strict=True)):
-            own = [i for i, number in enumerate(self.nonlinear) if k in number.effects]
-            if own:
-                slopes = effect.shape_slopes(motion, part)
-                if slopes is None:
-                    return None
+    def slopes(self, motion: Motion, theta: Array, amplitudes: Array) -> Array:
+        """Return ∂τ/∂θ (samples, numbers of θ) of a law that is `sloped`."""
+        total = np.zeros((len(self.nonlinear), len(motion.dq)))
+        for k, (effect, part) in enumerate(
+            zip(self.shaped(theta), self._split(amplitudes), strict=True)
+        ):
+            own = [i for i, (_, effects) in enumerate(self.nonlinear) if k in effects]
+            slopes = effect.shape_slopes(motion, part) if own else None
+            if slopes is not None:
                 total[own] += slopes.T
         return total.T
 
-    def starts(self, motion: Motion, arm: ArmModel,
-               sharpness: float | None = None) -> Iterator[Array]:
+    def starts(
+        self, motion: Motion, arm: ArmModel, sharpness: float | None = None
+    ) -> Iterator[Array]:
         """Return θ over the grids of its effects.
 
         Args:
             sharpness: the shared one [s/rad], where it is known.
         """
-        grids = [[effect] if {q.name for q in effect.parameters if q.shape} <= {_SHARED}
-                 else list(effect.shapes(motion, arm)) for effect in self.effects]
-        shared = np.array([number.name == _SHARED for number in self.nonlinear], dtype=bool)
+        grids = [
+            [effect]
+            if {q.name for q in effect.parameters if q.shape} <= {_SHARED}
+            else list(effect.shapes(motion, arm))
+            for effect in self.effects
+        ]
+        shared = np.array([q.name == _SHARED for q, _ in self.nonlinear], dtype=bool)
         widths = (sharpness,) if sharpness is not None else SHARP
         for effects in itertools.product(*grids):
             for width in widths if shared.any() else (1.0,):
@@ -265,8 +260,8 @@ class Law:
 
     def values(self, theta: Array, amplitudes: Array) -> tuple[dict[str, float], ...]:
         """Return the parameters of every effect, by name."""
-        return tuple(effect.values(own) for effect, own
-                     in zip(self.shaped(theta), self._split(amplitudes), strict=True))
+        pairs = zip(self.shaped(theta), self._split(amplitudes), strict=True)
+        return tuple(effect.values(own) for effect, own in pairs)
 
     def numbers(self, theta: Array, amplitudes: Array) -> dict[tuple[Effect, Quantity], float]:
         """Return the parameters of all effects; the shared sharpness once."""
@@ -286,15 +281,26 @@ class Law:
 
 
 # In the order of their size. Each is Coulomb and viscous friction and one cause more, but the first
-# two and eq. (10).
+# two and eq. (10); the last follows any curve, odd or not.
 LADDER = (
     Law("viscous", ("viscous",)),
     Law("coulomb", ("coulomb",)),
     Law("coulomb+viscous", ("coulomb", "viscous")),
-    *(Law(name, ("coulomb", "viscous", name)) for name in (
-        "torque_offset", "quadratic_drag", "load_friction", "presliding", "stribeck",
-        "concave_friction", "asymmetric_friction", "position_friction")),
+    *(
+        Law(name, ("coulomb", "viscous", name))
+        for name in (
+            "torque_offset",
+            "quadratic_drag",
+            "load_friction",
+            "presliding",
+            "stribeck",
+            "concave_friction",
+            "asymmetric_friction",
+            "position_friction",
+        )
+    ),
     Law("three_sigmoid", ("three_sigmoid",)),
+    Law("three_sigmoid+asymmetric_friction", ("three_sigmoid", "asymmetric_friction")),
 )
 
 
@@ -308,9 +314,4 @@ def law_named(name: str) -> Law:
     if name in laws:
         return laws[name]
     first, *further = name.split("+")
-    return with_further(laws[first], *further)
-
-
-def with_further(law: Law, *causes: str) -> Law:
-    """Return `law` with more causes."""
-    return Law("+".join((law.name, *causes)), (*law.members, *causes))
+    return Law(name, (*laws[first].members, *further))

@@ -5,15 +5,14 @@ out in turn. The interval is that of the difference of two laws on the same rows
 both, a cable that pulls or a noisy minute, cancels. It is about the law, not about its numbers:
 labels may differ where curves agree.
 
-An alternative explains the rows that were fitted as well as the chosen law. It may be as good on
-those held out, or measurably worse: then these are evidence for the chosen law, but they are the
-same few rows, and another day may fall out otherwise.
+Seven to ten speeds over two decades in both directions show a friction curve; standing still shows
+an offset apart from friction that is larger one way.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,14 +20,18 @@ from pipelines.dynamics.body import Array
 from pipelines.effects import find_effect
 from pipelines.estimation.nominal import plain_number
 from pipelines.estimation.varpro import held_out, linear_part
-from pipelines.friction.config import LadderConfig
+from pipelines.friction.config import FRICTION
 from pipelines.friction.fit import Equations, LawFit, fit_law, takes_power
-from pipelines.friction.laws import LADDER, Law, with_further
+from pipelines.friction.laws import LADDER, Law
+from pipelines.friction.weak_form import Mask, Stretch
 
-__all__ = ["CandidateFit", "Ladder", "Missing", "climb", "no_worse", "undecided"]
+__all__ = ["CandidateFit", "Coverage", "Ladder", "Missing", "climb", "coverage", "undecided"]
+__all__ += ["unseen"]
 
-
-_CONFIG = LadderConfig()
+_DRIVE = (
+    "drive the joint alone at 7 to 10 constant speeds over two decades, in both directions, "
+    "with ramps from rest"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,23 +62,29 @@ class Ladder:
     by: str  # "logs" | "blocks"
     torque: float  # [N m] rms of what was measured in the rows that judge
 
+    @property
+    def torque_error(self) -> float | None:
+        """Return the residual of the chosen law over the torque, in the rows that judge."""
+        return self.chosen.validate_rms / self.torque if self.torque > 0.0 else None
+
     def alike(self, candidate: CandidateFit) -> bool:
         """Return whether it is not measurably worse than the best."""
-        return not candidate.reason and no_worse(candidate.residual, self.best.residual)
+        return not candidate.reason and _no_worse(candidate.residual, self.best.residual)
 
     @property
     def alternatives(self) -> tuple[CandidateFit, ...]:
-        """Return other laws, nearly as simple as the chosen one, that fit as well."""
-        own, members = self.chosen.fit.found.residual, set(self.chosen.law.members)
-        return tuple(other for other in self.tried if other is not self.chosen and not other.reason
-                     and no_worse(other.fit.found.residual, own)
-                     and other.law.size <= self.chosen.law.size + 1
-                     and not members <= set(other.law.members))
+        """Return other laws, nearly as simple as the chosen one, that fit the same rows as well."""
+        chosen, found = self.chosen, []
+        for other in self.tried:
+            wider = set(chosen.law.members) <= set(other.law.members)
+            plain = not wider and not other.reason and other.law.size <= chosen.law.size + 1
+            if plain and _no_worse(other.fit.found.residual, chosen.fit.found.residual):
+                found.append(other)
+        return tuple(found)
 
 
-def climb(identify: Equations, validate: Equations | None,
-          laws: Sequence[Law] = LADDER) -> Ladder:
-    """Try `laws`, then further causes with the best of them while they are measurably better.
+def climb(identify: Equations, validate: Equations | None, laws: Sequence[Law] = LADDER) -> Ladder:
+    """Try `laws`.
 
     Args:
         identify: rows that laws are fitted to.
@@ -84,92 +93,31 @@ def climb(identify: Equations, validate: Equations | None,
     tried: list[CandidateFit] = []
     sharpness: float | None = None
     for law in laws:
-        tried.append(_try(identify, validate, law, None, sharpness))
+        fit = fit_law(identify, law, None, sharpness)
+        residual = _held_out(fit) if validate is None else validate.residual(fit)
+        takes = takes_power(identify, law, fit.joint, fit.found)
+        tried.append(CandidateFit(fit, residual, _fault(fit, takes)))
         if law.name == "coulomb+viscous":
-            sharpness = float(np.exp(tried[-1].fit.theta[0]))
-    # a law of several causes is no cause
-    causes = [law.name for law in laws if law.members[2:] and law.name in law.members]
-    for _ in range(_CONFIG.further):
-        best = _best(tried)
-        if best.law.name in ("viscous", "coulomb", "coulomb+viscous"):
-            break  # no single cause helps: two would be chance
-        wider = [_widened(identify, best, cause) for cause in causes
-                 if cause not in best.law.members]
-        gains = [_gain(identify, best, law, starts) for law, starts in wider]
-        order = sorted(range(len(gains)), key=lambda k: -gains[k])
-        hopeful = [k for k in order[:_CONFIG.hopeful] if gains[k] > 0.5 * _CONFIG.worth]
-        more = [_try(identify, validate, *wider[k]) for k in hopeful]
-        least = (1.0 - _CONFIG.more) * best.validate_rms**2
-        tried += [one if one.reason or one.validate_rms**2 < least else
-                  replace(one, reason=f"explains too little beside {best.law.name}")
-                  for one in more]  # it may explain the roughness of the model itself
-        if not more or no_worse(best.residual, _best(tried).residual):
-            break
-    best = _best(tried)
-    able = [one for one in tried if not one.reason and no_worse(one.residual, best.residual)]
-    chosen = min(able or [best], key=lambda one: (one.law.size, one.validate_rms))
+            sharpness = float(np.exp(fit.theta[0]))
+    possible = [one for one in tried if not one.reason] or tried
+    best = min(possible, key=lambda one: one.validate_rms)
+    alike = [one for one in possible if _no_worse(one.residual, best.residual)]
+    chosen = min(alike, key=lambda one: (one.law.size, one.validate_rms))
     torque = float(np.sqrt(np.mean(np.square((validate or identify).y))))
     return Ladder(tuple(tried), chosen, best, "blocks" if validate is None else "logs", torque)
 
 
-def _try(identify: Equations, validate: Equations | None, law: Law,
-         starts: Sequence[Array] | None, sharpness: float | None = None) -> CandidateFit:
-    fit = fit_law(identify, law, starts, sharpness)
-    residual = _held_out(fit) if validate is None else validate.residual(fit)
-    takes = takes_power(identify, law, fit.joint, fit.found)
-    return CandidateFit(fit, residual, _fault(fit, takes))
-
-
-def _best(tried: Sequence[CandidateFit]) -> CandidateFit:
-    able = [one for one in tried if not one.reason]
-    return min(able or tried, key=lambda one: one.validate_rms)
-
-
-def _widened(identify: Equations, best: CandidateFit, cause: str) -> tuple[Law, list[Array]]:
-    """Return the law of `best` with one more cause, and θ to start from: new numbers by grid."""
-    law = with_further(best.law, cause)
-
-    def keys(law: Law) -> list[object]:
-        return [number.name if number.name == "sharpness" else (number.effects, number.name)
-                for number in law.nonlinear]
-
-    known = dict(zip(keys(best.law), best.fit.theta, strict=True))
-    starts: dict[bytes, Array] = {}
-    for theta in law.starts(identify.nodes, identify.arms()[0], 1.0):
-        begin = np.array([known.get(key, value)
-                          for key, value in zip(keys(law), theta, strict=True)])
-        starts[begin.tobytes()] = begin
-    return law, list(starts.values())
-
-
-def _gain(identify: Equations, best: CandidateFit, law: Law, starts: Sequence[Array]) -> float:
-    """Return the share of the residual of `best` that the new columns of `law` explain.
-
-    To first order: what of each column lies outside everything that the fitted law can already do,
-    ∂ŷ/∂(β, θ). Below `worth` the two laws are not distinguishable.
-    """
-    found = best.fit.found
-    before = linear_part(found.jacobian, found.residual)
-    arms, gain = identify.arms(found.beta), 0.0
-    for theta in starts:
-        more = identify.law_columns(law, arms, theta)[:, best.law.amplitudes:]
-        after = linear_part(np.hstack([found.jacobian, more]), found.residual)
-        gain = max(gain, before.rss - after.rss)
-    return gain / before.rss if before.rss > 0.0 else 0.0
-
-
-def no_worse(residual: Array, best: Array) -> bool:
+def _no_worse(residual: Array, best: Array) -> bool:
     """Return whether residuals are not measurably larger than the best law's (rows,).
 
     Σ r² - Σ b² = Σ δ² + 2 Σ δ b with δ = r - b. Where the best law is right, b is noise, and the
     last sum is what chance does to the difference. Its deviation comes from sums over blocks,
     within which noise may remember itself.
     """
-    blocks = min(_CONFIG.blocks, len(best))
-    sums = np.array([part.sum() for part in np.array_split(2.0 * (residual - best) * best, blocks)])
+    parts = np.array_split(2.0 * (residual - best) * best, min(FRICTION.blocks, len(best)))
     difference = float(residual @ residual - best @ best)
-    chance = _CONFIG.sure * float(np.sqrt(sums @ sums))
-    return difference <= max(chance, _CONFIG.worth * float(best @ best))
+    chance = FRICTION.sure * float(np.linalg.norm([part.sum() for part in parts]))
+    return difference <= max(chance, FRICTION.worth * float(best @ best))
 
 
 def _held_out(fit: LawFit) -> Array:
@@ -180,7 +128,7 @@ def _held_out(fit: LawFit) -> Array:
     found = fit.found
     free = np.append(np.ones(len(found.beta), dtype=bool), ~np.array(found.at_bound, dtype=bool))
     part = linear_part(found.jacobian[:, free], found.residual)
-    blocks = np.arange(len(found.residual)) * _CONFIG.folds // len(found.residual)
+    blocks = np.arange(len(found.residual)) * FRICTION.folds // len(found.residual)
     return held_out(part.columns @ part.root, found.residual, blocks)
 
 
@@ -191,14 +139,17 @@ def _fault(fit: LawFit, takes: bool) -> str:
     that the rows hardly show are no fault: a law with too many of them judges no better than a
     simpler one.
     """
-    below = [number.name for number in fit.numbers
-             if number.low >= 0.0 and number.value < number.low - _CONFIG.sure * number.std]
+    below = [
+        number.name
+        for number in fit.numbers
+        if number.low >= 0.0 and number.value < number.low - FRICTION.sure * number.std
+    ]
     if below:
         return f"{', '.join(below)} would be negative"
     for effect in fit.law.effects[2:]:  # what the law has beyond Coulomb and viscous friction
         own = {f"{effect.name}.{q.name}" for q in effect.parameters if not q.shape}
         numbers = [number for number in fit.numbers if number.name in own]
-        if all(abs(number.value) <= _CONFIG.sure * number.std for number in numbers):
+        if all(abs(number.value) <= FRICTION.sure * number.std for number in numbers):
             return f"{', '.join(number.name for number in numbers)} may be zero"
     return "" if takes else "its curve would push at speeds that are not in these logs"
 
@@ -211,13 +162,69 @@ class Missing:
     record: str
 
 
+@dataclass(frozen=True)
+class Coverage:
+    """Speeds that were driven."""
+
+    fastest: float  # [rad/s]
+    slowest: float  # [rad/s] of the classes that are filled
+    forth: int  # classes of speed, five a decade, that were driven in the positive direction
+    back: int
+
+
+def coverage(stretches: Sequence[Stretch]) -> Coverage:
+    """Return the speeds at which there are rows enough."""
+    v = np.concatenate([stretch.middle[0] for stretch in stretches])
+    fastest = max(float(np.abs(v).max()), 1e-12)
+    size = np.maximum(np.abs(v), 1e-12 * fastest) / fastest
+    level = np.floor(FRICTION.classes * np.log10(size) + 1e-9)
+
+    def filled(side: Mask) -> Array:
+        levels, count = np.unique(level[side], return_counts=True)
+        return levels[(count >= FRICTION.filled) & (levels > -3 * FRICTION.classes)]
+
+    forth, back = filled(v > 0.0), filled(v < 0.0)
+    lowest = min((float(side[0]) for side in (forth, back) if side.size), default=0.0)
+    slowest = fastest * 10.0 ** (lowest / FRICTION.classes)
+    return Coverage(fastest, slowest, len(forth), len(back))
+
+
+def unseen(covered: Coverage, ladder: Ladder) -> tuple[Missing, ...]:
+    """Return gaps of the record, numbers hardly known, and laws that are not distinguishable."""
+    gaps, decades = [], float(np.log10(covered.fastest / covered.slowest))
+    if not (covered.forth and covered.back):
+        way = "negative" if covered.forth else "positive"
+        gaps.append(
+            f"the joint never moves in the {way} direction: Coulomb friction is confounded with an "
+            "offset"
+        )
+    elif min(covered.forth, covered.back) < FRICTION.speeds or decades < FRICTION.decades:
+        gaps.append(
+            f"speeds cover {decades:.1f} decades, {covered.forth} steps of five a decade forth and "
+            f"{covered.back} back"
+        )
+    vague = []
+    for number in ladder.chosen.fit.numbers:
+        if not number.known or number.std > FRICTION.doubtful * abs(number.value):
+            effect, _, quantity = number.name.partition(".")
+            vague.append(f"{find_effect(effect).words.title}, {quantity.replace('_', ' ')}")
+    if vague:
+        gaps.append(f"hardly known: {'; '.join(vague)}")
+    laws = undecided(ladder, covered.slowest, covered.fastest)
+    return (*(Missing(gap, _DRIVE) for gap in gaps), *laws)
+
+
 def undecided(ladder: Ladder, slowest: float, fastest: float) -> tuple[Missing, ...]:
     """Return every alternative, how far its curve lies from the chosen one, and what to record.
+
+    An alternative explains the rows that were fitted as well as the chosen law. It may be as good
+    on those held out, or measurably worse: then these are evidence for the chosen law, but they are
+    the same few rows, and another day may fall out otherwise.
 
     Args:
         slowest, fastest: speeds that were driven [rad/s].
     """
-    side = np.geomspace(max(slowest, 1e-3 * fastest), fastest, _CONFIG.points)
+    side = np.geomspace(max(slowest, 1e-3 * fastest), fastest, FRICTION.points)
     speed = np.concatenate([-side[::-1], side])
     chosen, found = ladder.chosen, []
     curve, (torque, unit, _) = chosen.fit.curve(speed), chosen.fit.joint.units
@@ -229,9 +236,10 @@ def undecided(ladder: Ladder, slowest: float, fastest: float) -> tuple[Missing, 
             why = "only the held-out rows speak against the second"
         elif chosen.law.size > other.law.size:
             why = "nothing tells them apart, and the first leaves a little less of held-out rows"
-        found.append(Missing(
+        words = (
             f"{chosen.law.title} or {other.law.title}: {why}, {chosen.law.size} numbers against "
             f"{other.law.size}; the curves differ by at most {plain_number(float(apart[most]))} "
-            f"{torque}, at {plain_number(abs(float(speed[most])))} {unit}",
-            find_effect(other.law.members[-1]).words.experiment))
+            f"{torque}, at {plain_number(abs(float(speed[most])))} {unit}"
+        )
+        found.append(Missing(words, find_effect(other.law.members[-1]).words.experiment))
     return tuple(found)

@@ -10,14 +10,13 @@ import numpy as np
 
 from pipelines.dynamics.body import Array
 from pipelines.dynamics.functions import NUMBERS
-from pipelines.friction.config import SimulationConfig
+from pipelines.friction.config import FRICTION
 from pipelines.friction.fit import LawFit
 from pipelines.friction.laws import OneJoint, gravity_columns
 from pipelines.friction.weak_form import Stretch
 
 __all__ = ["Simulated", "simulate_joint"]
 
-_CONFIG = SimulationConfig()
 # position [rad], speed [rad/s], what presliding friction remembers, command and load [N m]
 # -> acceleration [rad/s^2] and the rate of that number
 Rate = Callable[[float, float, float, float, float], tuple[float, float]]
@@ -39,41 +38,39 @@ def simulate_joint(stretch: Stretch, fit: LawFit, friction: bool = True) -> Simu
     that are held and sway do is taken as measured too. The joint is stepped in plain numbers: much
     faster than arrays of one.
     """
-    joint, coupling = fit.at(stretch)
-    weight = gravity_columns(stretch.q, stretch.revolute) @ np.array(joint.gravity)
-    weight[:-1] = 0.5 * (weight[1:] + weight[:-1])
-    load = (weight + stretch.sway @ coupling).tolist()
     states = np.full((len(stretch.t), 2), np.nan)
-    if joint.inertia > 0.0:
-        parts, rate = 1, _free(joint)
-        if friction:
-            step = float(np.median(np.diff(stretch.t)))
-            slope = _steepest(fit) * step / joint.inertia
-            parts = min(max(math.ceil(slope / _CONFIG.stable), 1), _CONFIG.most_steps)
-            rate = _rate_of(fit, joint)
-        q, v = states[0] = float(stretch.q[0]), float(stretch.dq[0])
-        z, tau, steps = 0.0, stretch.known_tau.tolist(), (np.diff(stretch.t) / parts).tolist()
-        for k, h in enumerate(steps):
-            for _ in range(parts):
-                q, v, z = _runge_kutta(rate, (q, v, z), tau[k], load[k], h)
-            if not abs(v) < _CONFIG.fastest:
-                break
-            states[k + 1] = q, v
+    joint = fit.joint.carrying(fit.found.beta)
+    if joint.inertia <= 0.0:
+        return Simulated(states[:, 0], states[:, 1])
+    weight = gravity_columns(stretch.q, stretch.revolute) @ np.array(joint.gravity)
+    load = (0.5 * (weight[1:] + weight[:-1]) + stretch.more @ fit.more).tolist()
+    parts, rate = 1, _rate_of(fit if friction else None, joint)
+    if friction:
+        side = np.geomspace(1e-5, 20.0, 400)
+        speed = np.concatenate([-side[::-1], side])
+        steepest = float(np.abs(np.diff(fit.curve(speed)) / np.diff(speed)).max())
+        slope = steepest * float(np.median(np.diff(stretch.t))) / joint.inertia
+        parts = min(max(math.ceil(slope / FRICTION.stable), 1), FRICTION.most_steps)
+    q, v = states[0] = float(stretch.q[0]), float(stretch.dq[0])
+    z, tau, steps = 0.0, stretch.known_tau.tolist(), (np.diff(stretch.t) / parts).tolist()
+    for k, h in enumerate(steps):
+        for _ in range(parts):
+            q, v, z = _runge_kutta(rate, (q, v, z), tau[k], load[k], h)
+        if not abs(v) < FRICTION.fastest:
+            break
+        states[k + 1] = q, v
     return Simulated(states[:, 0], states[:, 1])
 
 
-def _free(joint: OneJoint) -> Rate:
-    """Return the rate of a joint without friction."""
-    return lambda q, v, z, command, load: ((command - load) / joint.inertia, 0.0)
-
-
-def _rate_of(fit: LawFit, joint: OneJoint) -> Rate:
-    """Return the rate of a joint with the law's friction."""
+def _rate_of(fit: LawFit | None, joint: OneJoint) -> Rate:
+    """Return the rate of a joint with the friction of `fit`, or without."""
     constant = viscous = 0.0
     sigmoids: list[tuple[float, float]] = []
     loads, memories, drives, tanh, inertia = [], [], [], math.tanh, joint.inertia
-    values = fit.law.values(fit.theta, fit.amplitudes)
-    for effect, own in zip(fit.law.shaped(fit.theta), values, strict=True):
+    effects, values = (), ()
+    if fit is not None:
+        effects, values = fit.law.shaped(fit.theta), fit.law.values(fit.theta, fit.amplitudes)
+    for effect, own in zip(effects, values, strict=True):
         if (curve := effect.speed_curve(own)) is not None:
             constant, viscous = constant + curve.constant, viscous + curve.viscous
             sigmoids += zip(curve.heights, curve.sharpnesses, strict=True)
@@ -101,11 +98,12 @@ def _rate_of(fit: LawFit, joint: OneJoint) -> Rate:
     return rate
 
 
-def _runge_kutta(rate: Rate, state: tuple[float, float, float], command: float, load: float,
-                 h: float) -> tuple[float, float, float]:
+def _runge_kutta(
+    rate: Rate, state: tuple[float, float, float], command: float, load: float, h: float
+) -> tuple[float, float, float]:
     """Return position, speed and memory after a step `h` [s], of fourth order."""
     q, v, z = state
-    half = 0.5 * h
+    half, sixth = 0.5 * h, h / 6.0
     a1, r1 = rate(q, v, z, command, load)
     v2 = v + half * a1
     a2, r2 = rate(q + half * v, v2, z + half * r1, command, load)
@@ -113,13 +111,8 @@ def _runge_kutta(rate: Rate, state: tuple[float, float, float], command: float, 
     a3, r3 = rate(q + half * v2, v3, z + half * r2, command, load)
     v4 = v + h * a3
     a4, r4 = rate(q + h * v3, v4, z + h * r3, command, load)
-    sixth = h / 6.0
-    return (q + sixth * (v + 2.0 * v2 + 2.0 * v3 + v4), v + sixth * (a1 + 2.0 * a2 + 2.0 * a3 + a4),
-            z + sixth * (r1 + 2.0 * r2 + 2.0 * r3 + r4))
-
-
-def _steepest(fit: LawFit) -> float:
-    """Return the largest slope of the friction curve [N m s/rad]."""
-    side = np.geomspace(1e-5, 20.0, 400)
-    speed = np.concatenate([-side[::-1], side])
-    return float(np.abs(np.diff(fit.curve(speed)) / np.diff(speed)).max())
+    return (
+        q + sixth * (v + 2.0 * v2 + 2.0 * v3 + v4),
+        v + sixth * (a1 + 2.0 * a2 + 2.0 * a3 + a4),
+        z + sixth * (r1 + 2.0 * r2 + 2.0 * r3 + r4),
+    )

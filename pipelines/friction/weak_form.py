@@ -16,7 +16,7 @@ speed that runs straight, and right in the mean however it runs.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -28,20 +28,18 @@ from pipelines.errors import InputRejected
 from pipelines.estimation.motion import Reconstructed, encoder_resolution
 from pipelines.estimation.state_estimation import design, smooth
 from pipelines.estimation.tuning import tune
-from pipelines.friction.config import WeakFormConfig
+from pipelines.friction.config import FRICTION
 from pipelines.friction.laws import gravity_acts, gravity_columns
 from pipelines.io.log import ExperimentLog
 
-__all__ = ["Course", "Mask", "Stretch", "Sway", "Windows", "blocks_of_time", "moved",
-           "stretches_of", "sway_columns", "swaying"]
+__all__ = ["Course", "Mask", "Stretch", "Sway", "blocks_of_time", "moved", "stretches_of"]
+__all__ += ["sway_columns", "swaying"]
 
 Mask = npt.NDArray[np.bool_]
+Indices = npt.NDArray[np.intp]
 
 KINKED = 2  # numerics: order of a smoother for motion whose acceleration jumps
 GAUSS = 0.5 / 3.0**0.5  # numerics: of their time, from its middle: where two nodes lie
-
-
-_CONFIG = WeakFormConfig()
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +70,6 @@ def sway_columns(t: Array, q: Array, dq: Array, sways: Sequence[Sway], revolute:
     Returns:
         Means over the step after each sample (samples, columns); the last row is zero.
     """
-    if not sways:
-        return np.zeros((len(t), 0))
     rate = 1.0 / np.diff(t)
     middle = 0.5 * (q[1:] + q[:-1])
     turn = [np.sin(middle), np.cos(middle)]
@@ -86,45 +82,32 @@ def sway_columns(t: Array, q: Array, dq: Array, sways: Sequence[Sway], revolute:
         else:
             columns.append(np.diff(sway.lean * dq) * rate)
         columns += [lean * part for part in turn] if revolute else [lean]
-    return np.vstack([np.stack(columns, axis=1), np.zeros((1, len(columns)))])
+    return np.vstack([*columns, np.zeros((0, len(rate)))]).T
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Friction that changes in time by α c(t) g(v)."""
+    """Friction that changes in each log by α c(t) f(v), f its curve.
 
-    kind: str  # "trend" | "step"
-    form: str  # g: "whole", the curve of friction; "viscous", v; "coulomb", its sign
-    time: float  # [s] since the start of a stretch: of a step when; of a trend its time constant
-    holds: float  # [s] since the start: where c is zero, of a trend
-    until: float  # [s] duration of a trend's log; of a step when
-    part: int = 0  # stretch of a step
-    curve: tuple[Array, Array] | None = None  # speeds [rad/s] and torques [N m] of friction
-    time_std: float | None = None  # [s] of a trend's time constant
+    c = (exp(-h/T) - exp(-t/T)) / (1 - exp(-D/T)) rises by one over the duration D of a log.
+    """
 
-    def at(self, part: int, since: Array) -> Array:
-        """Return c(t) in one of the stretches, `since` its start [s]: it rises by one.
+    time: float  # T [s]
+    holds: float  # h [s] since the start of a log, where c is zero
+    until: float  # D [s]
+    time_std: float | None = None  # [s] of T
+    curve: tuple[Array, Array] | None = None  # speeds [rad/s] and torques [N m] of f
 
-        Of a trend (exp(-h/T) - exp(-t/T)) / (1 - exp(-D/T)).
-        """
-        if self.kind == "trend":
-            rise = np.exp(-self.holds / self.time) - np.exp(-since / self.time)
-            return np.asarray(rise / -np.expm1(-self.until / self.time))
-        after = since >= self.time if part == self.part else np.full(len(since), part > self.part)
-        return after.astype(np.float64)
+    def at(self, since: Array) -> Array:
+        """Return c(t) at times since the start of a log [s]."""
+        rise = np.exp(-self.holds / self.time) - np.exp(-since / self.time)
+        return np.asarray(rise / -np.expm1(-self.until / self.time))
 
-    def shape(self, v: Array) -> Array:
-        """Return g(v) [N m], [rad/s] or 1."""
-        if self.form == "viscous":
-            return v
-        if self.form == "coulomb" or self.curve is None:
-            return np.sign(v)
-        return np.interp(v, *self.curve)
-
-    def column(self, part: int, t: Array, dq: Array) -> Array:
-        """Return c(t) g(v) over the step after each sample (samples, 1); the last is zero."""
-        value = self.at(part, 0.5 * (t[1:] + t[:-1]) - t[0]) * self.shape(0.5 * (dq[1:] + dq[:-1]))
-        return np.append(value, 0.0)[:, None]
+    def column(self, t: Array, dq: Array) -> Array:
+        """Return c(t) f(v) over the step after each sample (samples - 1, 1)."""
+        assert self.curve is not None
+        shape = np.interp(0.5 * (dq[1:] + dq[:-1]), *self.curve)
+        return (self.at(0.5 * (t[1:] + t[:-1]) - t[0]) * shape)[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +116,7 @@ class Windows:
 
     nodes: Motion  # (nodes, 1)
     share: Array  # (nodes,) time of a node over the length of its window
-    first: npt.NDArray[np.intp]  # (windows,) first node of every window
+    first: Indices  # (windows,) first node of every window
     kept: Mask  # (windows,) whether it makes a row
 
     def means(self, columns: Array) -> Array:
@@ -167,14 +150,12 @@ class Stretch:
     spoilt: Mask  # (samples,) no row may use it
     window: int  # samples
     revolute: bool
-    posture: tuple[float, ...]  # [rad] of the other joints
     sways: tuple[Sway, ...] = ()
     speed_std: float = 0.0  # [rad/s] of the reconstructed speed
     weighs: bool = True  # gravity acts about the joint's axis
+    untimed: bool = False  # the torque is measured: when in its step it acted is not known
     sticks: Mask | None = None  # (windows,) the joint does not slide: no row of a sliding law
     course: Course | None = None  # of friction that changes in time
-    untimed: bool = False  # the torque is measured: when in its step it acted is not known
-    part: int = 0  # number of the stretch
 
     def only(self, rows: Mask) -> Stretch:
         """Return it with some of its usable rows (usable rows,), whichever it has now."""
@@ -187,7 +168,7 @@ class Stretch:
         return int(self.kept.sum())
 
     @cached_property
-    def edges(self) -> npt.NDArray[np.intp]:
+    def edges(self) -> Indices:
         """Return the samples at which windows begin and end."""
         return np.arange(0, len(self.t), self.window)
 
@@ -218,22 +199,24 @@ class Stretch:
         return np.diff(self.t[self.edges])
 
     @cached_property
+    def mean_torque(self) -> Array:
+        """Return the mean torque of every window (windows,) [N m]."""
+        return np.asarray(np.diff(self.impulse[self.edges]) / self.length)
+
+    @cached_property
     def torque(self) -> Array:
         """Return the mean torque of every window that is kept (rows,) [N m]."""
-        return np.asarray((np.diff(self.impulse[self.edges]) / self.length)[self.kept])
+        return self.mean_torque[self.kept]
 
     @cached_property
     def rigid(self) -> Array:
-        """Return the columns of J, of gravity, and of `sway` (rows, width)."""
+        """Return the columns of J, of gravity, and of `more` (rows, width)."""
         mean = np.diff(self.dq[self.edges]) / self.length
         gravity = gravity_columns(self.nodes.q[:, 0], self.revolute) * float(self.weighs)
-        columns = [mean[self.kept, None], self.windows.means(gravity)]
-        if self.sway.shape[1]:
-            sway = np.diff(self.swayed[self.edges], axis=0) / self.length[:, None]
-            if self.untimed:
-                sway[:, 0] = self._timing
-            columns.append(sway[self.kept])
-        return np.hstack(columns)
+        more = np.diff(self.pushed[self.edges], axis=0) / self.length[:, None]
+        if self.untimed:
+            more[:, 0] = self._timing
+        return np.hstack([mean[self.kept, None], self.windows.means(gravity), more[self.kept]])
 
     @property
     def _timing(self) -> Array:
@@ -247,7 +230,7 @@ class Stretch:
         return np.asarray((known[edges[1:]] - known[before]) / (edges[1:] - before))
 
     @cached_property
-    def _laid(self) -> tuple[Motion, Array, npt.NDArray[np.intp]]:
+    def _laid(self) -> tuple[Motion, Array, Indices]:
         return _nodes(self.t, self.q, self.dq, self.window)
 
     @property
@@ -261,28 +244,35 @@ class Stretch:
         nodes, ends, sample = self._laid
         first = np.searchsorted(sample, self.edges)
         length = np.full(len(sample), np.inf)
-        length[:first[-1]] = np.repeat(self.length, np.diff(first))
+        length[: first[-1]] = np.repeat(self.length, np.diff(first))
         return Windows(nodes, np.diff(ends) / length, first[:-1], self.kept)
 
+    def sampler(self, every: int, pointwise: bool) -> tuple[Motion, Callable[[Array], Array]]:
+        """Return nodes, and the means in every `every`-th row of columns over these nodes."""
+        if pointwise:
+            few = self.windows.thinned(every)
+            return few.nodes, few.means
+        return self.nodes, lambda columns: self.windows.means(columns)[::every]
+
     @cached_property
-    def sway(self) -> Array:
-        """Return more columns over the step after each sample (samples, columns).
+    def more(self) -> Array:
+        """Return more columns over the step after each sample (samples - 1, columns).
 
         Of a torque sample that may act a part of a step later or earlier, its change over the step;
         of joints that are held and sway; and of friction that changes.
         """
         parts = [sway_columns(self.t, self.q, self.dq, self.sways, self.revolute)]
         if self.untimed:
-            parts.insert(0, np.append(np.diff(self.known_tau), 0.0)[:, None])
+            parts.insert(0, np.diff(self.known_tau)[:, None])
         if self.course is not None:
-            parts.append(self.course.column(self.part, self.t, self.dq))
+            parts.append(self.course.column(self.t, self.dq))
         return np.hstack(parts)
 
     @cached_property
-    def swayed(self) -> Array:
-        """Return ∫ sway dt from the first sample (samples, columns)."""
-        steps = self.sway[:-1] * np.diff(self.t)[:, None]
-        return np.vstack([np.zeros((1, self.sway.shape[1])), np.cumsum(steps, axis=0)])
+    def pushed(self) -> Array:
+        """Return ∫ more dt from the first sample on (samples, columns)."""
+        steps = self.more * np.diff(self.t)[:, None]
+        return np.vstack([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
 
     def accumulated(self, values: Array) -> Array:
         """Return ∫ values dt of values (nodes,) from the first sample on (samples,)."""
@@ -291,15 +281,14 @@ class Stretch:
         return np.asarray(np.interp(self.t, ends, whole))
 
     @cached_property
-    def middle(self) -> tuple[Array, Array, Array]:
-        """Return mean position, speed and time of every row (rows,)."""
+    def middle(self) -> tuple[Array, Array]:
+        """Return mean speed, and mean time since the start, of every row (rows,)."""
         of = self.nodes
-        q, dq, t = self.windows.means(np.hstack([of.q, of.dq, of.t[:, None]])).T
-        return q, dq, t
+        dq, t = self.windows.means(np.hstack([of.dq, of.t[:, None]])).T
+        return dq, t - self.t[0]
 
 
-def _nodes(t: Array, q: Array, dq: Array,
-           window: int) -> tuple[Motion, Array, npt.NDArray[np.intp]]:
+def _nodes(t: Array, q: Array, dq: Array, window: int) -> tuple[Motion, Array, Indices]:
     """Place nodes along a motion; none is of samples on both sides of a multiple of `window`.
 
     Args:
@@ -309,21 +298,21 @@ def _nodes(t: Array, q: Array, dq: Array,
         The nodes, the times between them (nodes + 1,) [s], and the sample before each (nodes,).
     """
     change, middle = np.diff(dq), 0.5 * (dq[1:] + dq[:-1])
-    most = min(window, int(_CONFIG.coarsest * (len(t) - 1) / float(t[-1] - t[0]) + 1e-9))
+    most = min(window, int(FRICTION.coarsest * (len(t) - 1) / float(t[-1] - t[0]) + 1e-9))
     size = max(size for size in range(1, max(most, 1) + 1) if window % size == 0)
     parts, span = np.ones(len(change), dtype=np.int8), np.ones(len(change), dtype=np.int8)
-    little = _CONFIG.little * float(np.abs(dq).max())
+    little = FRICTION.little * float(np.abs(dq).max())
     mean, spread = np.zeros(0), np.zeros(0)
-    if size >= _CONFIG.pair:
+    if size >= FRICTION.pair:
         whole = len(change) // size * size
-        steady, mean, spread = _steady(middle[:whole].reshape(-1, size),
-                                       change[:whole].reshape(-1, size), little)
+        groups = middle[:whole].reshape(-1, size), change[:whole].reshape(-1, size)
+        steady, mean, spread = _steady(*groups, little)
         parts[:whole].reshape(-1, size)[steady] = 0
         parts[:whole:size][steady], span[:whole:size][steady] = 2, size
     alone = np.flatnonzero(parts == 1)
     jump = np.abs(change[alone])
-    turning = (np.abs(middle[alone]) < (_CONFIG.near + 0.5) * jump) & (jump > little)
-    parts[alone[turning]] = _CONFIG.parts
+    turning = (np.abs(middle[alone]) < (FRICTION.near + 0.5) * jump) & (jump > little)
+    parts[alone[turning]] = FRICTION.parts
     first = np.flatnonzero(parts > 0)
     count = parts[first].astype(np.intp)
     at = np.repeat(first, count)
@@ -358,21 +347,20 @@ def _steady(middle: Array, change: Array, little: float) -> tuple[Mask, Array, A
     mean = middle @ each
     square = np.square(middle - mean[:, None]) @ each + np.square(change) @ each / 12.0
     size = np.square(mean)
-    steady = (size > _CONFIG.steady**2 * square) | (size + square < little**2 / 4.0)
+    steady = (size > FRICTION.steady**2 * square) | (size + square < little**2 / 4.0)
     return steady, mean, np.sqrt(square)
 
 
-def blocks_of_time(stretches: Sequence[Stretch], length: float) -> npt.NDArray[np.intp]:
+def blocks_of_time(stretches: Sequence[Stretch], length: float) -> Indices:
     """Return the number, from 0, of the block of `length` [s] that each row is in (rows,)."""
-    codes = [10**7 * k + np.floor((stretch.middle[2] - stretch.t[0]) / length)
-             for k, stretch in enumerate(stretches)]
+    codes = [10**7 * k + np.floor(one.middle[1] / length) for k, one in enumerate(stretches)]
     return np.asarray(np.unique(np.concatenate(codes), return_inverse=True)[1], dtype=np.intp)
 
 
 def _travels(motion: Reconstructed) -> Mask:
     """Return whether a joint travels further than rounding moves one that is held (joints,)."""
     q = motion.motion.q[motion.good.kept[motion.good.fit]]
-    return np.asarray(np.ptp(q, axis=0) > _CONFIG.sway * encoder_resolution(motion.good))
+    return np.asarray(np.ptp(q, axis=0) > FRICTION.sway * encoder_resolution(motion.good))
 
 
 def swaying(motion: Reconstructed, joint: int) -> tuple[int, ...]:
@@ -387,13 +375,14 @@ def moved(motions: Sequence[Reconstructed]) -> Mask:
         far, rows = _travels(one), one.good.kept[one.good.fit]
         if one.std is not None:
             speed = np.sqrt(np.nanmean(np.square(one.motion.dq[rows]), axis=0))
-            far &= speed > _CONFIG.fast * np.nanmedian(one.std[1][rows], axis=0)
+            far &= speed > FRICTION.fast * np.nanmedian(one.std[1][rows], axis=0)
         moves.append(far)
     return np.asarray(np.any(moves, axis=0))
 
 
-def stretches_of(log: ExperimentLog, joint: int, found: Reconstructed, window: float,
-                 swaying: Sequence[int] = ()) -> tuple[Stretch, ...]:
+def stretches_of(
+    log: ExperimentLog, joint: int, found: Reconstructed, window: float, swaying: Sequence[int] = ()
+) -> tuple[Stretch, ...]:
     """Return what of `log` is usable for joint `joint`, in windows of `window` [s].
 
     Args:
@@ -401,11 +390,10 @@ def stretches_of(log: ExperimentLog, joint: int, found: Reconstructed, window: f
         found: the motion of `log`.
         swaying: joints that are held and sway.
     """
-    good, j = found.good, joint - 1
-    others = tuple(float(np.nanmedian(good.log.q[:, k])) for k in range(log.n_joints) if k != j)
-    size = max(_CONFIG.shortest, round(window / log.sample_time))
-    stretches = []
+    good, j, stretches = found.good, joint - 1, []
+    others = np.delete(np.nanmedian(good.log.q, axis=0), j).tolist()
     weighs = gravity_acts(log.robot, joint, others)
+    size = max(FRICTION.shortest, round(window / log.sample_time))
     for run in good.runs:
         rows = good.kept[run]
         q, dq = found.motion.q[rows, j], found.motion.dq[rows, j]
@@ -413,16 +401,24 @@ def stretches_of(log: ExperimentLog, joint: int, found: Reconstructed, window: f
         doubt = 0.0
         if found.std is not None:
             speed = found.std[1][rows, j]
-            spoilt |= speed > _CONFIG.vague * np.nanmedian(found.std[1][:, j])
+            spoilt |= speed > FRICTION.vague * np.nanmedian(found.std[1][:, j])
             doubt = float(np.nanmedian(speed))
         stretch = Stretch(
-            log.name, good.log.t[run],
+            log.name,
+            good.log.t[run],
             np.where(good.position_spikes[run, j], np.nan, good.log.q[run, j]),
-            good.log.tau[run, j], np.where(np.isfinite(q), q, 0.0),
-            np.where(np.isfinite(dq), dq, 0.0), spoilt, size, log.robot.joints[j].revolute,
-            others, tuple(_sway(found, run, k - 1, log.sample_time, k < joint) for k in swaying),
-            doubt, weighs, untimed=log.torque == "measured")
-        if len(stretch.edges) > _CONFIG.fewest and stretch.rows >= _CONFIG.fewest:
+            good.log.tau[run, j],
+            np.where(np.isfinite(q), q, 0.0),
+            np.where(np.isfinite(dq), dq, 0.0),
+            spoilt,
+            size,
+            log.robot.joints[j].revolute,
+            tuple(_sway(found, run, k - 1, log.sample_time, k < joint) for k in swaying),
+            doubt,
+            weighs,
+            log.torque == "measured",
+        )
+        if len(stretch.edges) > FRICTION.fewest and stretch.rows >= FRICTION.fewest:
             stretches.append(stretch)
     return tuple(stretches)
 

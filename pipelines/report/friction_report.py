@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipelines.effects import find_effect
-from pipelines.friction.config import FindingsConfig
+from pipelines.friction.config import FRICTION
 from pipelines.friction.findings import drift_in_words
 from pipelines.friction.fit import Value
 from pipelines.friction.laws import law_named
@@ -47,7 +47,7 @@ def friction_report(result: Result) -> Report:
         result=result,
         gates=gates,
         poor=[joint.name for joint in joints if joint.validation.by and not _well(joint)],
-        limit=FindingsConfig().poor,
+        limit=FRICTION.poor,
         units={joint.joint: units_of(joint) for joint in joints},
         drift=drift_in_words,
         plain=plain_law,

@@ -81,26 +81,18 @@ MACHINES = {
     "rests": replace(draw("rests", 1), seconds=20.0, rests=0.2),
     # a drive that regenerates and does not log it: torque that falls as speed rises
     "regenerating": replace(draw("rests", 1), seed=2, seconds=20.0, rests=0.2, viscous=(-0.4, -0.4), coulomb=(4.0, 4.0)),
-    # its slowest speed first, its fastest last, so that a step is nearly a bend of the curve
-    "ordered": replace(draw("step", 4014), rate=draw("rests", 1).rate, seconds=20.0, rests=0.2, when=11.3, drift=-0.3),
-    "step": replace(draw("step", 1), rate=draw("rests", 1).rate, seconds=20.0, rests=0.2, when=9.0, drift=0.3),
-    # slow speeds before the step, fast ones after it, and noise of a thousandth of its friction
-    "quiet": replace(draw("step", 11006), rate=draw("rests", 1).rate, seconds=20.0, rests=0.4, when=10.1),
 }
 
 
-USUAL, RARE = ("rests", "regenerating", "step"), ("ordered", "quiet")
-
-
 @cache
-def logs(names: tuple[str, ...]) -> dict[str, ExperimentLog]:
+def logs() -> dict[str, ExperimentLog]:
     """Logs of these machines, integrated side by side."""
-    return dict(zip(names, logs_of([MACHINES[name] for name in names]).values(), strict=True))
+    return dict(zip(MACHINES, logs_of(list(MACHINES.values())).values(), strict=True))
 
 
 @cache
 def computed(name: str, law: str | None) -> tuple[JointResult, Result]:
-    opened = Opened(Path("a.h5"), "", logs(USUAL if name in USUAL else RARE)[name], ())
+    opened = Opened(Path("a.h5"), "", logs()[name], ())
     result = fit_friction.compute(Inputs((opened,), label="logs"), Settings(law=law))
     return result.joints[0], result
 
@@ -131,46 +123,6 @@ def test_viscous_friction_below_zero_is_named() -> None:
     assert "regenerat" in check.remedy
 
 
-def test_friction_that_jumps_is_named_with_its_instant() -> None:
-    """Friction rises by 30 % at 9 s: instant to a rest's length, size to 2 %; inertia and curve are those before the step."""
-    machine = MACHINES["step"]
-    joint, _ = computed("step", "asymmetric_friction+stribeck")
-    assert joint.drift is not None
-    assert (joint.drift.kind, joint.drift.form) == ("step", "whole")
-    assert joint.drift.when == pytest.approx(9.0, abs=machine.rests)
-    assert joint.drift.change.value == pytest.approx(0.3, abs=0.02)
-    assert sure(joint.inertia, machine.inertia)
-    speed = joint.driven[1] * np.array([-0.9, -0.5, 0.5, 0.9])
-    apart = np.abs(np.interp(speed, joint.series.speed, joint.series.curve) - machine.friction(speed))
-    assert np.all(apart <= 0.01 * np.abs(machine.friction(speed)))
-
-
-@pytest.mark.slow
-def test_a_step_between_speeds_driven_in_order_is_no_bend_of_the_curve() -> None:
-    """A free choice of laws finds the step, and the curve before it beyond the speeds that were driven before."""
-    machine = MACHINES["ordered"]
-    joint, _ = computed("ordered", None)
-    assert joint.drift is not None
-    assert (joint.drift.kind, joint.drift.form) == ("step", "whole")
-    assert joint.drift.change.value == pytest.approx(-0.3, abs=0.03)
-    assert sure(joint.inertia, machine.inertia)
-    speed = joint.driven[1] * np.array([-0.9, -0.5, 0.5, 0.9])
-    curve, band = (np.interp(speed, joint.series.speed, x) for x in (joint.series.curve, joint.series.band))
-    assert np.all(np.abs(curve - machine.friction(speed)) <= 3.0 * band)
-    assert np.all(band <= 0.05 * np.abs(curve))
-
-
-@pytest.mark.slow
-def test_a_step_of_a_quiet_joint_is_not_taken_for_sticking() -> None:
-    """The rows that show it, slow ones in fast ramps, are fitted: its instant within a rest, its size within .03."""
-    machine = MACHINES["quiet"]
-    joint, _ = computed("quiet", None)
-    assert joint.drift is not None
-    assert (joint.drift.kind, joint.drift.form) == ("step", "whole")
-    assert joint.drift.when == pytest.approx(machine.when, abs=machine.rests)
-    assert joint.drift.change.value == pytest.approx(machine.drift, abs=0.03)
-
-
 def test_an_inertia_below_zero_is_remarked() -> None:
     """Of a joint that was driven alone within its deviation, of one among all at any."""
     joint, _ = computed("rests", "asymmetric_friction")
@@ -184,7 +136,7 @@ def test_an_inertia_below_zero_is_remarked() -> None:
 
 def test_a_validation_log_at_rest_judges_nothing() -> None:
     """It is reported, and held-out blocks of the identification log judge."""
-    log = logs(USUAL)["rests"]
+    log = logs()["rests"]
     still = {name: replace(signal, values=signal.values[:2500].copy()) for name, signal in log.signals.items()}
     still["q"] = replace(still["q"], values=MACHINES["rests"].encoder * (np.arange(2500) % 7 == 0.0)[:, None])
     rest = replace(log, name="rest", role="validate", signals=still)
@@ -192,16 +144,3 @@ def test_a_validation_log_at_rest_judges_nothing() -> None:
                                   Settings(law="coulomb+viscous"))
     assert result.joints[0].judged_by == "blocks"
     assert any(check.code == "RRID-D09" and "validation" in check.message for check in result.checks)
-
-
-def test_a_log_after_the_step_judges_the_law_with_the_step() -> None:
-    """The last quarter of the log, as one of role "validate": the residual is less than a twentieth of its torque."""
-    log = logs(USUAL)["step"]
-    after = {name: replace(signal, values=signal.values[-len(log.t) // 4:].copy()) for name, signal in log.signals.items()}
-    judging = replace(log, name="after", role="validate", signals=after)
-    (joint,) = fit_friction.compute(Inputs(tuple(Opened(Path(f"{one.name}.h5"), "", one, ()) for one in (log, judging)),
-                                           label="logs"), Settings(law="asymmetric_friction+stribeck")).joints
-    assert joint.drift is not None
-    assert joint.judged_by == "logs"
-    assert joint.validation.torque_error is not None
-    assert joint.validation.torque_error < 0.05

@@ -15,7 +15,7 @@ from pipelines.errors import Check, NothingMatched, UsageError
 from pipelines.fit_friction import Settings
 from pipelines.friction.result import JointResult, Result
 from pipelines.io.files import Opened, open_log, write_log
-from pipelines.io.log import Controller, ExperimentLog, Signal
+from pipelines.io.log import ExperimentLog, Signal
 from pipelines.io.model_file import read_model
 from pipelines.io.robot import format_robot
 from pipelines.stage import Inputs, Outcome, Request, run_stage
@@ -160,27 +160,12 @@ def test_bad_input_is_a_clear_finding(code: str, good: ExperimentLog, tmp_path: 
     assert found.exit_code == 1
 
 
-def test_a_compensation_that_the_torque_lacks(good: ExperimentLog) -> None:
-    """D18: the log says that gravity was compensated, its torque holds none of it. A total torque is no finding."""
-    says = Controller("open-loop", feedforward=("gravity",))
-    total = replace(good, controller=says)
-    weight = SINE * np.sin(good.q[:, 2]) + COSINE * np.cos(good.q[:, 2])
-    lacking = changed(total, tau=good.tau - np.stack([0 * weight, 0 * weight, weight], axis=1))
-    assert "D18" in gates(computed(lacking))
-    assert "D18" not in gates(computed(total))
-    assert "D18" not in gates(computed(replace(lacking, controller=None)))
-
-
-def test_two_postures_have_two_inertias(good: ExperimentLog) -> None:
-    """Logs with the other joints elsewhere: friction is shared, inertia and gravity are not."""
-    truth = TRUTHS["coulomb+viscous"]
-    heavy = driven(good.tau[:, 2], truth.torque, inertia=0.13, gravity=(1.2, 0.0))
-    other = as_log(np.round(heavy[:, 0] / 1e-5) * 1e-5, good.tau[:, 2], "elsewhere")
-    other = changed(other, q=other.q + np.array([0.0, 0.5, 0.0]))
-    (joint,) = computed(good, other).joints
-    found = sorted(posture.inertia.value for posture in joint.postures)
-    assert found == pytest.approx([INERTIA, 0.13], rel=0.01)
-    assert relative(joint.series.curve, truth.curve(joint.series.speed)) < 0.01
+def test_a_log_of_another_posture_is_left_out(good: ExperimentLog) -> None:
+    """Inertia and gravity are those of the first log; the other is named in a warning."""
+    other = replace(changed(good, q=good.q + np.array([0.0, 0.5, 0.0])), name="elsewhere")
+    result = computed(good, other)
+    assert result.joints[0].logs == (good.name,)
+    assert any(check.code == "RRID-D16" and check.where == "elsewhere" for check in result.checks)
 
 
 def test_no_log_to_fit(good: ExperimentLog) -> None:

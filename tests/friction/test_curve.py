@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pipelines.dynamics.body import Motion
 from pipelines.estimation.motion import Reconstruction, reconstruct
-from pipelines.friction.fit import LawEquations, LawFit, fit_law
+from pipelines.friction.fit import Equations, LawFit, fit_law
+from pipelines.friction.joint import refined
 from pipelines.friction.laws import OneJoint, law_named
-from pipelines.friction.refine import refined
 from pipelines.friction.weak_form import Stretch, stretches_of
 from tests.friction.one_joint import (
     COSINE,
@@ -35,10 +36,10 @@ def stretches(law: str, seed: int) -> tuple[Stretch, ...]:
 def fitted(seed: int) -> LawFit:
     log, assumed = recorded("three_sigmoid", seed), stretches("three_sigmoid", seed)
     joint = OneJoint.of(log.robot, JOINT)
-    fit = fit_law(LawEquations.of(assumed, joint), LAW)
+    fit = fit_law(Equations(assumed, joint), LAW)
     for _ in range(2):
         assumed = tuple(refined(stretch, fit, ENCODER) for stretch in assumed)
-        fit = fit_law(LawEquations.of(assumed, joint), LAW, [fit.theta])
+        fit = fit_law(Equations(assumed, joint), LAW, [fit.theta])
     return fit
 
 
@@ -75,3 +76,19 @@ def test_the_band_is_honest(fits: dict[int, LawFit]) -> None:
         speed = driven_speeds(recorded("three_sigmoid", seed))
         scores.append((fit.curve(speed) - TRUTHS["three_sigmoid"].curve(speed)) / fit.curve_std(speed))
     assert 0.6 < np.sqrt(np.mean(np.square(scores))) < 1.6
+
+
+def test_slopes_by_complex_step() -> None:
+    """∂τ/∂ln w of eq. (10), by a step along the imaginary axis."""
+    law = law_named("three_sigmoid")
+    assert law is not None
+    v = np.linspace(-3.0, 3.0, 201)
+    still = np.zeros((len(v), 1))
+    w, f = np.array([120.0, 60.0, 12.0]), np.array([0.4, 1.2, -0.4])
+    found = law.slopes(Motion(still[:, 0], still, v[:, None], still), np.log(w), np.append(f, 0.12))
+    assert found is not None
+    for k in range(3):
+        ahead = w.astype(complex)
+        ahead[k] *= np.exp(1e-30j)
+        slope = np.imag(np.tanh(np.multiply.outer(v, ahead)) @ f) / 1e-30
+        np.testing.assert_allclose(found[:, k], slope, rtol=1e-9, atol=1e-12)

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from pipelines.estimation.motion import Reconstruction, reconstruct
-from pipelines.friction.coverage import coverage, unseen
-from pipelines.friction.fit import LawEquations
+from pipelines.friction.fit import Equations
 from pipelines.friction.joint import JointFit, JointLogs, fit_joint
 from pipelines.friction.laws import OneJoint
-from pipelines.friction.model_selection import climb
+from pipelines.friction.model_selection import climb, coverage, unseen
 from pipelines.friction.weak_form import Stretch
 from tests.friction.one_joint import JOINT, STEP, TRUTHS, driven_speeds, recorded, relative
 
@@ -50,12 +49,12 @@ def plateaus(speeds: tuple[float, ...], friction: object, rest: bool, noise: flo
         spoilt[max(0, edge - 20):edge + 20] = True
     q = np.concatenate([[0.0], np.cumsum(0.5 * STEP * (dq[1:] + dq[:-1]))])
     tau = np.array([friction(v) for v in dq.tolist()]) + 1.7 * np.sin(q) + noise * rng.standard_normal(len(dq))  # type: ignore[operator]
-    return Stretch("plateaus", t, q, tau, q, dq, spoilt, 20, True, ())
+    return Stretch("plateaus", t, q, tau, q, dq, spoilt, 20, True)
 
 
 def climbed(stretch: Stretch) -> tuple[object, tuple[str, ...], tuple[str, ...]]:
     joint = OneJoint.of(recorded("coulomb+viscous", 1).robot, JOINT)
-    ladder = climb(LawEquations.of((stretch,), joint), None)
+    ladder = climb(Equations((stretch,), joint), None)
     gaps = unseen(coverage((stretch,)), ladder)
     others = tuple(one.law.name for one in ladder.alternatives)
     return ladder.chosen.law.name, others, tuple(f"{gap.what} {gap.record}" for gap in gaps)

@@ -27,13 +27,12 @@ def known(law: Law, amplitudes: list[float], shapes: list[float]) -> LawFit:
     size = len(beta) + len(shapes)
     found = SeparableFit(np.log(shapes), beta, np.zeros((size, size)), np.ones(size), np.zeros(1), np.zeros((1, size)),
                          (False,) * len(shapes))
-    return LawFit(law, joint, ((0.0, 0.0),), found, 3)
+    return LawFit(law, joint, found, 3)
 
 
 def stretch(tau: Array = TORQUE) -> Stretch:
     nothing = np.zeros(len(tau))
-    return Stretch("given", T, nothing, tau, nothing, nothing, np.zeros(len(tau), dtype=bool), 20, True, (0.0, 0.0),
-                   ())
+    return Stretch("given", T, nothing, tau, nothing, nothing, np.zeros(len(tau), dtype=bool), 20, True)
 
 
 def integrated(acceleration: object, states: int = 2) -> Array:

@@ -27,7 +27,7 @@ def left_over(joint: int, size: float) -> tuple[float, float]:
     apart = whole - rigid.torque(q, dq, ddq)[:, j]
     sways = [Sway(size * np.sin((3.0 + 2.3 * k) * t), size * (3.0 + 2.3 * k) * np.cos((3.0 + 2.3 * k) * t), k < j)
              for k in range(3) if k != j]
-    columns = sway_columns(t, q[:, j], dq[:, j], sways, True)[:-1]
+    columns = sway_columns(t, q[:, j], dq[:, j], sways, True)
     mean = 0.5 * (apart[1:] + apart[:-1])
     rest = mean - columns @ np.linalg.lstsq(columns, mean, rcond=1e-10)[0]
     return float(np.sqrt(np.mean(apart**2))), float(np.sqrt(np.mean(rest**2)))

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from pipelines.estimation.nominal import plain_number
-from pipelines.friction.coverage import coverage
-from pipelines.friction.fit import LawEquations
+from pipelines.friction.fit import Equations
 from pipelines.friction.laws import OneJoint
-from pipelines.friction.model_selection import climb, undecided
+from pipelines.friction.model_selection import climb, coverage, undecided
 from tests.friction.one_joint import JOINT, recorded
 from tests.friction.test_model_selection import plateaus
 
@@ -27,7 +26,7 @@ def drag(v: float) -> float:
 def told() -> list[str]:
     """Of a joint that was driven at three speeds only: drag or a hump."""
     stretch = plateaus(_SPEEDS, drag, False, 0.02)
-    ladder = climb(LawEquations.of((stretch,), OneJoint.of(recorded("coulomb+viscous", 1).robot, JOINT)), None)
+    ladder = climb(Equations((stretch,), OneJoint.of(recorded("coulomb+viscous", 1).robot, JOINT)), None)
     covered = coverage((stretch,))
     return [gap.what for gap in undecided(ladder, covered.slowest, covered.fastest)]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.writing_cases import PAPER_MM, PAPER_RATIOS, campaign, missed, true_arm
-from pipelines.friction.in_folder import fitted_in_folder
+from pipelines.friction.several import fitted_in_folder
 from pipelines.io.files import open_log
 from sample_logs.bench_session import machine
 from tests.healthy import begun
