@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -39,8 +40,8 @@ def findings_of(joint: JointFit, result: JointResult) -> list[Check]:
             "let 'rrrid inspect' look at logs that move every joint: if it finds no columns mixed "
             "up, turn the sign of this joint's torque or position in the import",
         )
-    j, close = number - 1, {"rtol": 1e-6, "atol": 1e-12}
-    if "current" in log and np.allclose(log["current"][:, j], log.tau[:, j], **close):
+    tau, close = log.tau[:, number - 1], partial(np.allclose, rtol=1e-6, atol=1e-12)
+    if "current" in log and close(log["current"][:, number - 1], tau, equal_nan=True):
         warn(
             "S10",
             f"torque of joint {number} is its motor current, sample for sample",

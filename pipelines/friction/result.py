@@ -131,7 +131,7 @@ class Result:
     robot: str
     joints: tuple[JointResult, ...]
     source: str  # "one joint at a time" | "all joints at once"
-    checks: tuple[Check, ...]  # of the logs, and what the fit says of them
+    checks: tuple[Check, ...]  # of the logs and of the fit
     model: ModelFile = field(metadata=NOT_STORED, repr=False)
     derived: tuple[tuple[str, ExperimentLog], ...] = field(metadata=NOT_STORED, repr=False)
 

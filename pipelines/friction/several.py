@@ -75,7 +75,8 @@ def _runs_of(log: LogEquations, j: int) -> list[_Run]:
 
         def mean(columns: Array, places: Array = places) -> Array:
             x = centre_samples(columns) if held else columns
-            return (x if cutoff is None else zero_phase(x, cutoff, log.rate))[places]
+            x = x if cutoff is None else zero_phase(x, cutoff, log.rate)
+            return np.asarray(x[places])
 
         runs.append(_Run(Motion(t, *states), y[own], fixed[own], mean))
     return runs

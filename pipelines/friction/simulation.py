@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from pipelines.dynamics.body import Array
 from pipelines.dynamics.functions import NUMBERS
+from pipelines.effects.base import Effect
 from pipelines.friction.config import FRICTION
 from pipelines.friction.fit import LawFit
 from pipelines.friction.laws import OneJoint, gravity_columns
@@ -67,10 +68,11 @@ def _rate_of(fit: LawFit | None, joint: OneJoint) -> Rate:
     constant = viscous = 0.0
     sigmoids: list[tuple[float, float]] = []
     loads, memories, drives, tanh, inertia = [], [], [], math.tanh, joint.inertia
-    effects, values = (), ()
+    law: Iterable[tuple[Effect, dict[str, float]]] = ()
     if fit is not None:
-        effects, values = fit.law.shaped(fit.theta), fit.law.values(fit.theta, fit.amplitudes)
-    for effect, own in zip(effects, values, strict=True):
+        values = fit.law.values(fit.theta, fit.amplitudes)
+        law = zip(fit.law.shaped(fit.theta), values, strict=True)
+    for effect, own in law:
         if (curve := effect.speed_curve(own)) is not None:
             constant, viscous = constant + curve.constant, viscous + curve.viscous
             sigmoids += zip(curve.heights, curve.sharpnesses, strict=True)
