@@ -27,9 +27,9 @@ from pipelines.estimation.estimate import (
     with_cutoff,
 )
 from pipelines.estimation.filters import centre_samples, zero_phase
-from pipelines.estimation.mean_period import averaged
 from pipelines.estimation.motion import Motions, Reconstruction, reconstruct
 from pipelines.estimation.nominal import fitted_arm, nominal_columns
+from pipelines.estimation.periods import averaged
 from pipelines.estimation.regression import Columns, LogEquations
 from pipelines.friction.config import FRICTION
 from pipelines.friction.fit import Equations
