@@ -166,14 +166,10 @@ class ResidualConfig:
     series: int = 3000  # points of a series
     segment: int = 512  # rows of a spectrum
     band: float = 0.8  # of the power that the band holds
-    waves: float = 2.0  # of the lowest order in the range: half the width of the window's line
-    part: float = 0.25  # of a wave of the highest order: angles are counted in parts as wide
-    rare: float = 10.0  # times the mean, that a row counts at most at an angle hardly visited
     as_much: float = 0.9  # of what a curve over time shows of a cause
     bins: int = 96  # of a proof
     rows: int = 4  # of a bin, at least
     shown: float = 0.2  # of the predicted power, that its means over a signal have to hold
-    stretch: float = 2.0  # [s] of a proof over time
     seconds: float = 3.0  # of a simulated log that are shown at most
     points: int = 1500  # of the same
 

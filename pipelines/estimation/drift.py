@@ -12,7 +12,7 @@ that have not. A residual has no std of its own: it is judged by the scatter of 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -33,9 +33,8 @@ class Session:
     name: str
     robot: str = ""
     recorded: str = ""  # when; the order of the sessions
-    figures: Mapping[str, tuple[float, float, str]] = field(
-        default_factory=dict
-    )  # value, std, unit
+    # value, std, unit
+    figures: Mapping[str, tuple[float, float, str]] = field(default_factory=dict)
     residuals: Mapping[str, tuple[float, str]] = field(default_factory=dict)  # value, unit
 
 
@@ -74,8 +73,8 @@ def drift_of(sessions: Iterable[Session]) -> tuple[RobotDrift, ...]:
     return tuple(
         RobotDrift(
             robot,
-            _series([(one.name, one.figures) for one in own], _of_figure),
-            _series([(one.name, one.residuals) for one in own], _of_residual),
+            _series([(one.name, one.figures) for one in own]),
+            _series([(one.name, one.residuals) for one in own]),
         )
         for robot, own in sorted(robots.items())
         if len(own) > 1
@@ -84,50 +83,51 @@ def drift_of(sessions: Iterable[Session]) -> tuple[RobotDrift, ...]:
 
 def _series(
     sessions: Sequence[tuple[str, Mapping[str, tuple[Any, ...]]]],
-    judge: Callable[[str, list[tuple[Any, ...]]], dict[str, Any]],
 ) -> tuple[DriftFigure, ...]:
     """Return every figure that two sessions have in the same unit."""
     found = []
     for name in dict.fromkeys(name for _, numbers in sessions for name in numbers):
         values = {item: numbers[name] for item, numbers in sessions if name in numbers}
-        units = {unit for *_, unit in values.values()}
-        if len(values) > 1 and len(units) == 1:
-            told = judge(name, list(values.values()))
-            far = zip(values, told["away"], strict=True)
-            moved = tuple(item for item, away in far if abs(away) > _CONFIG.limit)
-            value = tuple(float(one[0]) for one in values.values())
-            unit = units.pop()
-            found.append(DriftFigure(name, unit, tuple(values), value, moved=moved, **told))
+        units = {numbers[-1] for numbers in values.values()}
+        if len(values) < 2 or len(units) > 1:
+            continue
+        value = np.array([numbers[0] for numbers in values.values()], dtype=np.float64)
+        if all(len(numbers) > 2 for numbers in values.values()):
+            std = np.array([numbers[1] for numbers in values.values()], dtype=np.float64)
+            away, own = _of_figure(_on_one_turn(name, value, std), std)
+        else:
+            away, own = _of_residual(value)
+        moved = tuple(np.array(list(values))[np.abs(away) > _CONFIG.limit].tolist())
+        items, numbers = tuple(values), tuple(value.tolist())
+        found.append(
+            DriftFigure(name, units.pop(), items, numbers, tuple(away.tolist()), moved=moved, **own)
+        )
     return tuple(found)
 
 
-def _of_figure(name: str, values: list[tuple[Any, ...]]) -> dict[str, Any]:
+def _of_figure(value: Array, std: Array) -> tuple[Array, dict[str, Any]]:
     """Judge values by their own standard deviations."""
     from scipy.special import gammaincc
 
-    value, std = (np.array([one[k] for one in values]) for k in (0, 1))
-    turned, weight, freedom = _on_one_turn(name, value, std), 1.0 / std**2, len(value) - 1
-    mean = np.sum(weight * turned) / np.sum(weight)
-    chi_square = float(np.sum(weight * (turned - mean) ** 2))
-    return {
+    weight, freedom = 1.0 / std**2, len(value) - 1
+    mean = np.sum(weight * value) / np.sum(weight)
+    chi_square = float(np.sum(weight * (value - mean) ** 2))
+    return from_others(value, std), {
         "std": tuple(std.tolist()),
-        "away": tuple(from_others(turned, std).tolist()),
         "chi_square": chi_square,
         "freedom": freedom,
         "probability": float(gammaincc(freedom / 2.0, chi_square / 2.0)),
-        "trend": float((turned[-1] - turned[0]) / np.hypot(std[-1], std[0])),
+        "trend": float((value[-1] - value[0]) / np.hypot(std[-1], std[0])),
     }
 
 
-def _of_residual(name: str, values: list[tuple[Any, ...]]) -> dict[str, Any]:
+def _of_residual(value: Array) -> tuple[Array, dict[str, Any]]:
     """Judge by the median absolute deviation, where there are enough items."""
-    value = np.array([one[0] for one in values])
     deviation = value - np.median(value)
     scatter = _MAD_TO_STD * float(np.median(np.abs(deviation)))
     if len(value) < _CONFIG.enough or scatter == 0.0:
-        return {"away": (0.0,) * len(value), "trend": 0.0}
-    trend = float(value[-1] - value[0]) / (math.sqrt(2.0) * scatter)
-    return {"away": tuple((deviation / scatter).tolist()), "trend": trend}
+        return np.zeros(len(value)), {"trend": 0.0}
+    return deviation / scatter, {"trend": float(value[-1] - value[0]) / (math.sqrt(2.0) * scatter)}
 
 
 def _on_one_turn(name: str, value: Array, std: Array) -> Array:
@@ -148,20 +148,13 @@ def from_others(value: Array, std: Array) -> Array:
     """
     kept = np.ones(len(value), dtype=bool)
     while True:
-        weight = np.where(kept, 1.0 / std**2, 0.0)
-        others = _sum_of_others(weight)
-        mean = _sum_of_others(weight * value) / others
-        away = np.asarray((value - mean) / np.sqrt(std**2 + 1.0 / others))
+        weight = np.where(kept, 1.0 / std**2, 0.0) * ~np.eye(len(value), dtype=bool)
+        others = weight.sum(axis=1)
+        away = np.asarray((value - weight @ value / others) / np.sqrt(std**2 + 1.0 / others))
         worst = int(np.argmax(np.where(kept, np.abs(away), 0.0)))
         if abs(away[worst]) <= _CONFIG.limit or np.sum(kept) <= max(2, (len(value) + 1) // 2):
             return away
         kept[worst] = False
-
-
-def _sum_of_others(x: Array) -> Array:
-    """Return for each the sum of all others, summed: a difference would lose small values."""
-    before = np.concatenate(([0.0], np.cumsum(x[:-1])))
-    return before + np.concatenate((np.cumsum(x[:0:-1])[::-1], [0.0]))
 
 
 def is_drift(drift: RobotDrift) -> bool:

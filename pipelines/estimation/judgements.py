@@ -26,6 +26,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -43,11 +44,13 @@ from pipelines.estimation.nominal import (
     nominal_columns,
     with_offsets,
 )
-from pipelines.estimation.preparation import Prepared
 from pipelines.estimation.regression import Columns, LogEquations
-from pipelines.estimation.rows import Data
 from pipelines.io.log import Array, recording
 from pipelines.quality.subject import NotTested, Subject
+
+if TYPE_CHECKING:
+    from pipelines.estimation.preparation import Prepared
+    from pipelines.estimation.rows import Data
 
 _CONFIG = JudgeableConfig()
 REMEDY = "move the joints concerned further and faster, in more postures, and all of them at once"

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipelines.estimation.config import MotionConfig
-from pipelines.estimation.filters import welch
 from pipelines.estimation.grids import Measured, lay_on, measured
 from pipelines.estimation.motion import (
     Reconstructed,
@@ -57,8 +56,6 @@ class Series:
     speed_std: Array  # largest of the stretch
     acceleration: Array
     acceleration_std: Array
-    frequency: Array  # [Hz] (bins,)
-    error_density: Array  # [rad²/Hz] (bins, joints)
 
 
 @dataclass(frozen=True)
@@ -79,7 +76,6 @@ class LogResult:
     innovation_correlation: Array  # rms of their autocorrelation over 30 lags
     innovation_verdict: tuple[str, ...]  # what that means
     reconstruction_error_max: Array  # [rad] max |measured - reconstructed|
-    reconstruction_error_rms: Array  # [rad]
     peak_speed: Array
     peak_acceleration: Array
     position_std: Array  # of the reconstruction, in the middle of all samples
@@ -162,7 +158,6 @@ def assess(
         innovation_correlation=correlation,
         innovation_verdict=tuple(map(_verdict, white.tolist(), correlation.tolist())),
         reconstruction_error_max=np.nanmax(np.abs(error), axis=0),
-        reconstruction_error_rms=np.sqrt(np.nanmean(error**2, axis=0)),
         peak_speed=np.abs(found.motion.dq[kept[inside]]).max(axis=0),
         peak_acceleration=np.abs(found.motion.ddq[kept[inside]]).max(axis=0),
         position_std=position,
@@ -206,8 +201,6 @@ def _series(seen: Measured, found: Reconstructed, error: Array) -> Series:
     kept, t = seen.good.kept, seen.good.log.t
     size = max(1, -(-len(kept) // _CONFIG.buckets))
     first = np.arange(0, len(kept), size)
-    longest = max(seen.good.runs, key=lambda run: run.stop - run.start)
-    shown = np.nan_to_num(error[longest][: _CONFIG.longest])
     middle = t[np.minimum(first + size // 2, len(t) - 1)]
 
     def envelope(x: Array) -> Array:
@@ -223,5 +216,4 @@ def _series(seen: Measured, found: Reconstructed, error: Array) -> Series:
         envelope(found.std[1][kept]),
         envelope(found.motion.ddq[kept]),
         envelope(found.std[2][kept]),
-        *welch(shown, 1.0 / seen.step),
     )

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,9 +25,11 @@ from pipelines.effects.base import ArmModel, Effect, FrictionLaw, everywhere, pl
 from pipelines.errors import UsageError
 from pipelines.estimation.estimate import Estimate
 from pipelines.estimation.regression import Columns
-from pipelines.estimation.rows import Data
 from pipelines.io.log import Array
 from pipelines.io.robot import RobotDescription
+
+if TYPE_CHECKING:
+    from pipelines.estimation.rows import Data
 
 _SEED, _STATES = 20040509, 400  # numerics
 _ABSORBED = 1e-6  # numerics: share of a column outside the rigid body: below it, rounding

@@ -226,8 +226,7 @@ class NoiseFloor:
     position: Array  # [rad] standard deviation of one sample of one period
     torque: Array  # [N m]
     cutoff_hz: float | None  # of the low-pass of equations; None: none
-    position_low_pass: Array  # [rad] the same behind the low-pass
-    torque_low_pass: Array  # [N m]
+    torque_low_pass: Array  # [N m] the same behind the low-pass
     unlike: str  # why the periods are not averaged, in words; empty where they are
 
 
@@ -266,7 +265,7 @@ def mean_period(
             periods = average_periods(x, rate, period, passed, least, (0,))
     except InputRejected as problem:
         none = np.full(joints, np.nan)
-        return NoiseFloor(0, (), none, none, cutoff_hz, none, none, problem.message), None
+        return NoiseFloor(0, (), none, none, cutoff_hz, none, problem.message), None
     # ½ (τ_k + τ_{k-1}) of a command
     centred = passed if log.torque == "measured" else passed * np.cos(np.pi * hz / rate)
     sample = np.sqrt(periods.noise_variance)
@@ -276,7 +275,6 @@ def mean_period(
         sample[:joints],
         sample[joints:],
         cutoff_hz,
-        passed_std(periods.rest[..., :joints], passed),
         passed_std(periods.rest[..., joints:], centred),
         _unlike(periods, passed, least, joints),
     )

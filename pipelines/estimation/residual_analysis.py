@@ -1,18 +1,13 @@
 """Analyse what a fitted model leaves: over time, and against all that it may depend on.
 
-    evidence(fit, floor, …)           the residual over time, and against all that it may depend on
-    proof(before, after, joint, …)    of the joint that shows most of a finding
-
-A joint that goes to and fro over a part of a turn is longer at some angles than at others.
-Amplitudes over the orders of an angle let every angle count alike, and less towards the ends of the
-range (von Hann's window): 2 |Σ w(q) x e^(-jkq)| / Σ w(q), x less its mean.
+evidence(fit, floor, …)           the residual over time, and against all that it may depend on
+proof(before, after, joint, …)    of the joint that shows most of a finding
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -24,7 +19,6 @@ from pipelines.io.log import Array
 from pipelines.simulation.comparison import Simulation
 
 _CONFIG = ResidualConfig()
-_ORDERS = np.arange(0.5, 80.25, 0.25)  # [1/rev]
 
 
 @dataclass(frozen=True)
@@ -32,7 +26,7 @@ class Proof:
     """The figure that proves a finding: the residual before and after, and what the cause predicts.
 
     Of the joint that shows most of it, over the signal that the cause depends on, in bins of equal
-    count, or, where it depends on none, the amplitudes of all three over frequency; and over time.
+    count, or, where it depends on none, the amplitudes of all three over frequency.
     """
 
     joint: int  # 1-based, whose residual is shown
@@ -43,10 +37,6 @@ class Proof:
     after: Array  # with it
     predicted: Array  # what the finding predicts of `before`
     spread: Array  # (bins,) [N m] standard error of `before`; none over frequency
-    t: Array  # (samples,) [s] a stretch of time where it shows most
-    before_in_time: Array
-    after_in_time: Array
-    predicted_in_time: Array
 
 
 @dataclass(frozen=True)
@@ -63,17 +53,6 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Spectrum:
-    """Of one joint's residual: over time's frequency or over the orders of its angle."""
-
-    joint: int
-    over: Literal["frequency", "order"]
-    unit: str  # "Hz" | "1/rev"
-    x: Array  # (bins,)
-    amplitude: Array  # [N m] of each line or bin
-
-
-@dataclass(frozen=True)
 class Evidence:
     """Residual analysis of one log."""
 
@@ -85,7 +64,6 @@ class Evidence:
     simulated_t: Array | None  # [s] (points,)
     simulated_position_error: Array | None  # [rad] (points, joints) simulated minus measured
     curves: tuple[Curve, ...]
-    spectra: tuple[Spectrum, ...]
     above_noise_floor: Array  # (joints,) share of the residual's power that is above the floor
     band: Array  # (joints, 2) [Hz] in which most of that lies
     simulated_log: str = ""  # name of the log that was simulated in closed loop
@@ -144,34 +122,14 @@ def _travel(one: LogData, joint: int) -> Array:
     return np.asarray(one.at_rows(q - q[begin[which]]))
 
 
-def amplitudes(q: Array, x: Array) -> tuple[Array, Array]:
-    """Return the resolved orders [1/rev] and the amplitude of each wave over the angle q in x.
-
-    Both (rows,). None where the joint stood still.
-    """
-    span = float(np.ptp(q)) if len(q) else 0.0
-    if span <= 0.0:
-        return _ORDERS[:0], _ORDERS[:0]
-    orders = _ORDERS[_CONFIG.waves * 2.0 * np.pi / span <= _ORDERS]
-    along = (q - q.min()) / span
-    parts = max(1, int(np.ceil(span * _ORDERS[-1] / (2.0 * np.pi * _CONFIG.part))))
-    part = np.minimum((along * parts).astype(int), parts - 1)
-    count = np.bincount(part, minlength=parts)[part]
-    weight = np.minimum(1.0 / count, _CONFIG.rare * parts / len(q)) * np.sin(np.pi * along) ** 2
-    total = max(float(weight.sum()), 1e-300)
-    rest = weight * (x - weight @ x / total)
-    size = [abs(rest @ np.exp(-1j * order * q)) for order in orders]
-    return orders, 2.0 * np.asarray(size, dtype=np.float64) / total
-
-
 def evidence(done: Refined, floor: Array, nominal: Simulation, extended: Simulation) -> Evidence:
-    """Return the residual of the nominal model over the first log, curves and spectra over all,
+    """Return the residual of the nominal model over the first log, curves over all,
     and the position errors of both models where both ran in closed loop.
     """
     data, left, n = done.data, done.left, done.data.n_joints
     predicted = data.y - left
     measured, modelled, rest = (next(iter(data.split(x))).T for x in (data.y, predicted, left))
-    curves, spectra, bands = list[Curve](), list[Spectrum](), np.full((n, 2), np.nan)
+    curves, bands = list[Curve](), np.full((n, 2), np.nan)
     parts = list(data.split(left))
     longest = max(range(len(parts)), key=lambda k: len(parts[k][0]))
     for joint in range(n):
@@ -183,14 +141,9 @@ def evidence(done: Refined, floor: Array, nominal: Simulation, extended: Simulat
             curves.append(Curve(joint + 1, one[0], one[1], x, mean, spread, share))
         lines = _over_frequency(data.logs[longest], parts[longest][joint])
         if lines is not None:
-            spectra.append(Spectrum(joint + 1, "frequency", "Hz", *lines))
             total = np.cumsum(np.square(lines[1])) / max(float(np.sum(lines[1] ** 2)), 1e-300)
             ends = np.searchsorted(total, (0.5 - 0.5 * _CONFIG.band, 0.5 + 0.5 * _CONFIG.band))
             bands[joint] = lines[0][np.minimum(ends, len(total) - 1)]
-        orders, waves = amplitudes(_at_rows(data, "q")[:, joint], own)
-        if len(orders):
-            unit = "1/rev" if data.logs[0].log.robot.revolute[joint] else "1/(2 pi m)"
-            spectra.append(Spectrum(joint + 1, "order", unit, orders, waves))
     every = slice(None, None, max(1, -(-len(measured) // _CONFIG.series)))
     first = nominal.first if extended.first is not None else None
     shown = slice(0)
@@ -206,7 +159,6 @@ def evidence(done: Refined, floor: Array, nominal: Simulation, extended: Simulat
         simulated_t=None if first is None else first.t[shown],
         simulated_position_error=None if first is None else first.error[shown],
         curves=tuple(curves),
-        spectra=tuple(spectra),
         above_noise_floor=np.clip(1.0 - np.square(floor / done.rms), 0.0, 1.0),
         band=bands,
         simulated_log="" if first is None else first.log,
@@ -244,12 +196,10 @@ def proof(
     three = (before.left, after.left, before.left - after.left)
     shown = joint - 1 if joint is not None else int(np.argmax(data.rms(three[2]) / before.rms))
     parts = [x[data.joint == shown] for x in three]
-    t, rows = _stretch(data, parts[2])
-    over_time = (t, *(x[rows] for x in parts))
     if log is not None:
         there = data.log_of[data.joint == shown] == log
         best: Signal = ("time", "s", data.logs[log].t)
-        return _over(best, [x[there] for x in parts], shown, over_time)
+        return _over(best, [x[there] for x in parts], shown)
     time, *others = signals(data, shown, data.y - before.left)
     power = {one[0]: _followed(one, parts[2]) for one in (time, *others)}
     # in a log that goes once through its range anything is shown over time: when, and not by what
@@ -264,33 +214,14 @@ def proof(
             hertz, none = found[0][0], np.zeros(len(found[0][0]))
             without, with_it, predicted = (amplitude for _, amplitude in found)
             curves = (hertz, without, with_it, predicted, none)
-            return Proof(shown + 1, "frequency", "Hz", *curves, *over_time)
-    return _over(best, parts, shown, over_time)
+            return Proof(shown + 1, "frequency", "Hz", *curves)
+    return _over(best, parts, shown)
 
 
-def _over(
-    signal: Signal, parts: Sequence[Array], joint: int, over_time: tuple[Array, ...]
-) -> Proof:
+def _over(signal: Signal, parts: Sequence[Array], joint: int) -> Proof:
     """Return `parts`, without the finding, with it and what it predicts, over a signal."""
     name, unit, values = signal
     x, without, spread, count = binned(values, parts[0], _CONFIG.bins)
     with_it, predicted = (binned(values, part, _CONFIG.bins)[1] for part in parts[1:])
     curves = (x, without, with_it, predicted, spread / np.sqrt(count))
-    return Proof(joint + 1, name, unit, *curves, *over_time)
-
-
-def _stretch(data: Data, predicted: Array) -> tuple[Array, slice]:
-    """Return time and rows of the stretch in which the predicted part varies most.
-
-    The variance, not the power: a joint at rest shows a constant, which proves nothing.
-    """
-    first, best, found = 0, -1.0, slice(0, 0)
-    for one in data.logs:
-        step = float(np.median(np.diff(one.t))) if one.rows > 1 else 1.0
-        size = max(2, min(one.rows, round(_CONFIG.stretch / step)))
-        for start in range(first, first + one.rows - size + 1, max(1, size // 2)):
-            power = float(np.var(predicted[start : start + size]))
-            if power > best:
-                best, found = power, slice(start, start + size)
-        first += one.rows
-    return np.concatenate([one.t for one in data.logs])[found], found
+    return Proof(joint + 1, name, unit, *curves)

@@ -20,7 +20,6 @@ from pipelines.report.figures import (
     joint_colour,
     legend,
     one_figure,
-    rows_figure,
     signals_figure,
 )
 from pipelines.report.frf_figures import posture_words
@@ -103,7 +102,7 @@ def draw_responses(axes: Axes, answers: Sequence[Answer], frequency: float) -> N
 
 
 def evidence_figures(one: Evidence, number: int, units: Units) -> list[Figure]:
-    """Torque and residual over time, simulated position, spectra, curves over signals."""
+    """Torque and residual over time, simulated position, curves over signals."""
     torque, suffix = units.torque, f"-{number + 1}" if number else ""
     series = np.concatenate([one.measured, one.predicted, one.residual], axis=1)
     t, series = broken_at_gaps(one.t, series)
@@ -122,18 +121,6 @@ def evidence_figures(one: Evidence, number: int, units: Units) -> list[Figure]:
         )
         name, quantity = f"position-error{suffix}", f"simulated − measured [{units.thousandths}]"
         figures.append(signals_figure(name, caption, one.simulated_t, errors, quantity))
-    for over, x in (("order", "order [1/rev]"), ("frequency", "frequency [Hz]")):
-        if spectra := [s for s in one.spectra if s.over == over]:
-
-            def draw_row(axis: Axes, k: int, spectra=spectra) -> None:  # type: ignore[no-untyped-def]
-                axis.plot(spectra[k].x, spectra[k].amplitude, color=style.BLUE, linewidth=1.0)
-
-            rows, caption = (
-                [f"joint {s.joint}" for s in spectra],
-                f"{one.log}: residual over {over}.",
-            )
-            name, quantity = f"residual-{over}{suffix}", f"amplitude [{torque}]"
-            figures.append(rows_figure(name, caption, rows, draw_row, quantity, x=x))
     if one.curves:
         figures.append(_curves_figure(f"residual-over{suffix}", one))
     return figures

@@ -10,15 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.diagnosis.result import Alternative, Finding, Result, Value
 from pipelines.effects import find_effect
 from pipelines.estimation.nominal import within
 from pipelines.report.config import REPORT
 from pipelines.report.document import sentence
 from pipelines.report.style import format_number, with_std
+
+if TYPE_CHECKING:
+    from pipelines.diagnosis.result import Alternative, Finding, Result, Value
 
 __all__ = ["beyond_chance", "headlines", "how_much", "of_any_size", "other_joint", "where"]
 

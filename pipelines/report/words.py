@@ -13,16 +13,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from pipelines.diagnosis.result import Diagnosis, Extension, Finding, Rejected, Value
 from pipelines.dynamics.parameter_names import named_in, numbered, part_of
 from pipelines.effects import effect_names, find_effect
 from pipelines.estimation.nominal import within
-from pipelines.estimation.preparation import FewerTerms
 from pipelines.report.document import capital, sentence
 from pipelines.report.finding_words import other_joint
 from pipelines.report.style import enumerated, format_unit, unit_in_words, with_std
 
 if TYPE_CHECKING:
+    from pipelines.diagnosis.result import Diagnosis, Extension, Finding, Rejected, Value
+    from pipelines.estimation.preparation import FewerTerms
     from pipelines.excitation.verify import Peak
 
 _COUNTED = ("second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
@@ -50,7 +50,8 @@ def together(found: Iterable[Finding | Rejected]) -> list[tuple[str, str]]:
     """(cause, words) of each cause once with its joints: "Stribeck friction at joints 1 and 3"."""
     places = []
     for one in found:
-        other = other_joint(one.parameters) if isinstance(one, Finding) else ""
+        parameters = getattr(one, "parameters", None)  # a rejected cause has none
+        other = other_joint(parameters) if parameters else ""
         places.append((one.cause, f"{one.joint or ''}{f' ({other})' if other else ''}"))
     return at_places(places)
 
@@ -217,6 +218,8 @@ def unit_of(limits: Iterable[Peak], quantity: str) -> str:
 
 def units_in(found: Diagnosis | Extension) -> Units:
     """Return the units of a result: curves over positions in metres are of sliding joints."""
+    from pipelines.diagnosis.result import Extension
+
     if isinstance(found, Extension):
         return Units(found.revolute)
     sliding = {

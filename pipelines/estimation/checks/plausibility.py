@@ -46,7 +46,6 @@ from pipelines.estimation.least_squares import Indices
 from pipelines.io.log import Array, ExperimentLog, recording
 from pipelines.quality.checks import check_log
 from pipelines.quality.subject import NotTested, Subject, spread
-from pipelines.simulation.commanded import against_command
 
 _CONFIG = PlausibilityConfig()
 _BLOCKS, _ROUNDS = 4, 6  # numerics
@@ -304,9 +303,18 @@ def _found(subject: Subject, e: Evidence | str) -> tuple[Check | NotTested, ...]
     clear = {one.code for one in found if isinstance(one, Check) and one.level == "ok"}
     if "RRID-S15" in clear:  # gains may be described wrong, and the torque be right
         clear.add("RRID-S10")
-    told = [check for check in against_command(subject) if check.code not in clear - {"RRID-T06"}]
+    told = [check for check in _against_command(subject) if check.code not in clear - {"RRID-T06"}]
     codes_told = {check.code for check in told}
     return (*told, *(one for one in found if one.code not in codes_told))
+
+
+def _against_command(subject: Subject) -> tuple[Check, ...]:
+    """Return what the log's controller says of its torque; nothing where none is described."""
+    if subject.log.controller is None:
+        return ()
+    from pipelines.simulation.commanded import against_command
+
+    return against_command(subject)
 
 
 def _rms(x: Array) -> float:
@@ -506,7 +514,7 @@ def _said(log: ExperimentLog, skip_sanity_checks: bool) -> tuple[Check, ...] | C
     checks = [check for check in check_log(subject) if check.level != "ok"]
     if reject := next((check for check in checks if check.level == "reject"), None):
         # A controller says by how much a torque is too large, its limits only that it is.
-        exact = against_command(subject) if reject.code == "RRID-S05" else ()
+        exact = _against_command(subject) if reject.code == "RRID-S05" else ()
         return next((check for check in exact if check.code == "RRID-S10"), reject)
     against = mismatches(subject)
     if not skip_sanity_checks and (gate := next((check for check in against if check.gate), None)):
