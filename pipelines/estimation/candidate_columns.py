@@ -156,9 +156,7 @@ def first_samples(data: Data) -> Motion:
     return Motion(m.t[:8], m.q[:8], m.dq[:8], m.ddq[:8], tau)
 
 
-def usable(
-    mine: Family | None, one: Wanted, laws: Sequence[Effect], revolute: Sequence[bool]
-) -> Family:
+def usable(mine: Family | None, one: Wanted, laws: Sequence[Effect]) -> Family:
     """Return the shapes of a wanted cause, `mine`, that a model with such friction can take up.
 
     Raises:
@@ -171,12 +169,9 @@ def usable(
         why, remedy = "it happens once: no model of the arm holds it", "leave its moment out"
     elif effect.name in {law.name for law in laws}:
         why, remedy = "the nominal model has it already", "name a cause that it lacks"
-    elif effect.evidence == "none":
-        why, remedy = "it is a law of friction, and no cause", "extend a model that has it: --model"
     elif effect.evidence == "base parameters":
         why = "no reference logs show that the base parameters moved as it moves them"
         remedy = "name reference logs from before it: --reference PATH"
     else:
-        places = (place_of(o.name, o.joint) for o in everywhere(type(effect), revolute))
-        why, remedy = "this arm does not have it there", f"write {' or '.join(places) or 'another'}"
+        why, remedy = "this arm cannot take it up there", "name another cause, or another joint"
     raise UsageError("C02", f"{one.place}: {why}", "--with", remedy)

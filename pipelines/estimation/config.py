@@ -95,7 +95,6 @@ class FitConfig:
     # when the terms of a friction law are distinguished
     sure: float = 2.0  # standard deviations
     vague: float = 1.0  # of the logarithm of a sharpness: it may be three times as large
-    rough: float = 0.3  # of the same, from which on no deviation is given
     worth: float = 0.99  # of the squared error that a plainer law leaves: more is no gain
     much: float = 0.85  # of the same; at 21 joints with one sigmoid none left less than .89
     long: float = 0.25  # times the equations of a joint in later logs

@@ -234,6 +234,7 @@ def _refuse_held(motions: Motions, held: Sequence[Mask], fitted: bool) -> None:
 
 
 _AS_LITTLE = "fewer terms leave as little of what was held out"
+_UNCLEAR = "the logs do not tell its sharpnesses from each other"
 
 
 def with_terms_told_apart(prepared: Prepared, blocks: int) -> Prepared:
@@ -256,7 +257,7 @@ def with_terms_told_apart(prepared: Prepared, blocks: int) -> Prepared:
         rung = rungs.chosen(law)
         laws += rungs.laws_for(law, rung)
         if rung:
-            why = rungs.unclear(law, 0) or _AS_LITTLE
+            why = _UNCLEAR if rungs.unclear(law, 0) else _AS_LITTLE
             fewer.append(FewerTerms(law.joint, law.name, plainer(law)[rung - 1], why))
     return replace(prepared, columns=replace(given, laws=tuple(laws)), fewer=tuple(fewer))
 
@@ -326,11 +327,11 @@ class _Rungs:
         fitted = self.at(rung)[0].model.columns.laws
         return [one for one in fitted if (one.name, one.joint) in wanted]
 
-    def unclear(self, law: Effect, rung: int) -> str:
-        """Return why terms of a law are not distinguished; empty where they are."""
+    def unclear(self, law: Effect, rung: int) -> bool:
+        """Return whether terms of a law are not distinguished."""
         done, own = self.at(rung)[0], self.laws_for(law, rung)
         laws = enumerate(done.model.columns.laws)
-        return next(filter(None, (unclear(done, k) for k, one in laws if one in own)), "")
+        return any(unclear(done, k) for k, one in laws if one in own)
 
 
 def _left(done: Refined, blocks: int) -> Array:
@@ -363,32 +364,22 @@ def _on(law: Effect, rung: int, laws: Sequence[Effect]) -> list[Effect]:
     return [find_effect(name)(joint=law.joint) for name in names if name not in there]
 
 
-def unclear(done: Refined, place: int) -> str:
-    """Return why the terms of law number `place` are not distinguished; empty where they are.
+def unclear(done: Refined, place: int) -> bool:
+    """Return whether the terms of law number `place` are not distinguished.
 
     Of each sharpness its logarithm has to be known, and two have to differ beyond their deviation
     √(C_aa + C_bb - 2 C_ab).
     """
-    law = done.model.columns.laws[place]
-    own = done.numbers_of(0, place)
+    law, own = done.model.columns.laws[place], done.numbers_of(0, place)
     if not own or not plainer(law):
-        return ""
-    covariance, turning = done.covariance(), done.model.columns.body.robot.revolute
-    turns = law.joint is None or turning[law.joint - 1]
-    values, words, vague = {}, {}, []
-    for k, name in own:
-        value, std = float(getattr(law, name)), float(np.sqrt(max(covariance[k, k], 0.0)))
-        unit = next(q.unit_at(turns) for q in law.parameters if q.name == name)
-        values[name], words[name] = value, f"{name} = {value:.3g} {unit} (hardly determined)"
-        if 0.0 < std < _CONFIG.rough:
-            words[name] = f"{name} = {value:.3g} ± {std * value:.1g} {unit}"
-        if not 0.0 < std < _CONFIG.vague:
-            vague.append(words[name])
-    if vague:
-        return " and ".join(vague)
-    for (i, one), (j, other) in pairwise(sorted(own, key=lambda pair: values[pair[1]])):
-        variance = covariance[i, i] + covariance[j, j] - 2.0 * covariance[i, j]
-        apart = float(np.sqrt(max(variance, 0.0)))
-        if np.log(values[other] / values[one]) <= _CONFIG.sure * apart:
-            return f"{words[other]} and {words[one]} may be one"
-    return ""
+        return False
+    number = [k for k, _ in own]
+    value = np.log([float(getattr(law, name)) for _, name in own])
+    covariance = done.covariance()[np.ix_(number, number)]
+    variance = np.diag(covariance)
+    if not np.all((variance > 0.0) & (variance < _CONFIG.vague**2)):
+        return True
+    spread = np.sqrt(np.maximum(variance + variance[:, None] - 2.0 * covariance, 0.0))
+    order = np.argsort(value)
+    low, high = order[:-1], order[1:]
+    return bool(np.any(value[high] - value[low] <= _CONFIG.sure * spread[low, high]))
