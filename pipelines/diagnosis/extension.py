@@ -53,7 +53,7 @@ def extend(
     for one in wanted:
         key = (one.effect.name, one.effect.joint)
         revolute = model.arm.robot.revolute
-        usable(later.dictionary.families.get(key), one, model.columns.laws)
+        usable(later.dictionary.families.get(key), one, model.columns.laws, revolute)
     responses = compliance(prepared.logs.frf, model.nominal)
     named = {one.place: one for one in (responses.named if responses else ())}
     standing = standing_of(prepared.reference, later)

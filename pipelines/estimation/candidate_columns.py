@@ -156,7 +156,9 @@ def first_samples(data: Data) -> Motion:
     return Motion(m.t[:8], m.q[:8], m.dq[:8], m.ddq[:8], tau)
 
 
-def usable(mine: Family | None, one: Wanted, laws: Sequence[Effect]) -> Family:
+def usable(
+    mine: Family | None, one: Wanted, laws: Sequence[Effect], revolute: Sequence[bool]
+) -> Family:
     """Return the shapes of a wanted cause, `mine`, that a model with such friction can take up.
 
     Raises:
@@ -173,5 +175,6 @@ def usable(mine: Family | None, one: Wanted, laws: Sequence[Effect]) -> Family:
         why = "no reference logs show that the base parameters moved as it moves them"
         remedy = "name reference logs from before it: --reference PATH"
     else:
-        why, remedy = "this arm cannot take it up there", "name another cause, or another joint"
+        places = (place_of(o.name, o.joint) for o in everywhere(type(effect), revolute))
+        why, remedy = "this arm does not have it there", f"write {' or '.join(places) or 'another'}"
     raise UsageError("C02", f"{one.place}: {why}", "--with", remedy)
