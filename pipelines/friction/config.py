@@ -24,9 +24,6 @@ class FrictionConfig:
     parts: int = 8  # nodes of an interval in which speed passes zero
     near: float = 2.0  # changes of speed in a sample: nearer to zero its sign may turn over
     little: float = 1e-4  # of the fastest speed: slower creep does not need its every sample
-    steady: float = 8.0  # times its std: a mean speed that keeps its sign and most of its size
-    pair: int = 3  # samples, from which two nodes replace them
-    coarsest: float = 1e-2  # [s] of the samples that two nodes replace
     # search
     scanned: int = 120  # rows that a scan for starts looks at
     starts: int = 4  # of them, searched on these rows

@@ -142,6 +142,9 @@ class Piece(Protocol):
     @property
     def nodes(self) -> Motion: ...  # (nodes, 1)
 
+    @property
+    def largest(self) -> float: ...  # [N m] torque on the joint, rests and reversals included
+
     # nodes, and the rows of columns (nodes, k) over them: every so-many-th one, of a law that may
     # have memory unless it is pointwise
     def sampler(self, every: int, pointwise: bool) -> tuple[Motion, Callable[[Array], Array]]: ...
@@ -153,7 +156,6 @@ class Equations:
 
     pieces: Sequence[Piece]
     joint: OneJoint
-    largest: float = float("inf")  # [N m] torque on the joint, rests and reversals included
     every: int = 1  # the rows are every `every`-th one of a piece
 
     @cached_property
@@ -251,7 +253,8 @@ def takes_power(equations: Equations, law: Law, joint: OneJoint, found: Separabl
     both = law.curve(np.concatenate([speed, -speed]), joint, found.theta, amplitudes)
     forth, back = np.split(both, 2)
     weight = float(np.linalg.norm(joint.carrying(found.beta).gravity))
-    most = max(equations.largest + weight, abs(float(forth[-1])), abs(float(back[-1])))
+    largest = max(piece.largest for piece in equations.pieces)
+    most = max(largest + weight, abs(float(forth[-1])), abs(float(back[-1])))
     if float(np.abs(both).max()) > most:
         return False
     odd = bool(np.allclose(forth, -back, rtol=1e-9, atol=1e-12))

@@ -136,11 +136,6 @@ class JointFit:
     course: Course | None  # of friction that changes in time
 
 
-def _equations(stretches: Sequence[Stretch], joint: OneJoint) -> Equations:
-    largest = max(float(np.abs(stretch.mean_torque).max()) for stretch in stretches)
-    return Equations(stretches, joint, largest)
-
-
 def fit_joint(logs: JointLogs, window: float, law: Law | None = None) -> JointFit:
     """Fit `law`, or choose one.
 
@@ -158,11 +153,11 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None) -> JointFi
         moves = ~sliding.resting
     stretches = left_out(usable, moves)
     flexible = LADDER[-1]
-    fit = fit_law(_equations(stretches[:fitted], joint), flexible)
+    fit = fit_law(Equations(stretches[:fitted], joint), flexible)
     stretches = tuple(refined(stretch, fit, resolution) for stretch in stretches)
-    fit = fit_law(_equations(stretches[:fitted], joint), flexible, [fit.theta])
+    fit = fit_law(Equations(stretches[:fitted], joint), flexible, [fit.theta])
     if slide:
-        square = np.square(_equations(stretches, joint).residual(fit))
+        square = np.square(Equations(stretches, joint).residual(fit))
         doubt, sure = square[~sliding.slides[moves]], square[sliding.slides[moves]]
         follow = doubt.sum() <= sure.sum() or doubt.mean() <= FRICTION.worse * sure.mean()
         if not follow:  # one curve does not fit the other rows as well as those that slide
@@ -178,8 +173,8 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None) -> JointFi
     laws = (
         (law,) if law is not None else tuple(one for one in LADDER if one.pointwise or not sticks)
     )
-    judging = _equations(validate, joint) if validate else None
-    ladder = climb(_equations(identify, joint), judging, laws)
+    judging = Equations(validate, joint) if validate else None
+    ladder = climb(Equations(identify, joint), judging, laws)
     both, chosen = (*identify, *validate), ladder.chosen.fit
     if not sticks:  # reversals are kinks of the speed, and where it sticks they are left out
         both = tuple(refined(stretch, chosen, resolution) for stretch in both)
@@ -283,7 +278,7 @@ def _with_course(
         own = None if course is None else replace(course, curve=(speed, fit.curve(speed)))
         stretches = tuple(replace(stretch, course=own) for stretch in stretches)
         joint = fit.joint.carrying(0.0 * fit.found.beta)
-        fit = fit_law(_equations(stretches[:fitted], joint), fit.law, [fit.theta])
+        fit = fit_law(Equations(stretches[:fitted], joint), fit.law, [fit.theta])
     return stretches, fit
 
 

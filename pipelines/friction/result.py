@@ -7,14 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipelines.dynamics.arm import Arm
-from pipelines.dynamics.body import Motion
 from pipelines.errors import Check
 from pipelines.estimation.estimate import Fitted
 from pipelines.estimation.motion import Motions
 from pipelines.friction.config import FRICTION
 from pipelines.friction.fit import LawFit, Value
 from pipelines.friction.joint import JointFit
-from pipelines.friction.laws import gravity_columns, gravity_names
+from pipelines.friction.laws import gravity_names
 from pipelines.friction.model_selection import Ladder, Missing, undecided
 from pipelines.friction.several import SeveralFit
 from pipelines.friction.weak_form import moved
@@ -85,15 +84,8 @@ class Series:
     band: Array  # [N m] one standard deviation
     # (samples,) of the judged log, thinned out; empty where nothing was simulated
     t: Array  # [s]
-    torque: Array  # [N m]
-    friction: Array  # simulated
-    gravity: Array
-    inertial: Array
-    q: Array  # [rad] measured
-    dq: Array  # [rad/s]
-    q_with: Array  # simulated with friction
-    dq_with: Array
-    q_without: Array
+    dq: Array  # [rad/s] measured
+    dq_with: Array  # simulated with friction
     dq_without: Array
 
 
@@ -217,30 +209,11 @@ def _curve(fit: LawFit, fastest: float) -> tuple[Array, Array, Array]:
 
 
 def _series(joint: JointFit) -> Series:
-    """Return the curve, and torque by its parts along the simulated motion, as in Fig. 5.
-
-    Gravity is that of the measured position, as in the simulation.
-    """
-    driven, stretch, fit = joint.driven, joint.driven.stretch, joint.fit
-    simulated = driven.with_friction
-    ddq = np.gradient(simulated.dq, stretch.t)
-    motion = Motion(stretch.t, simulated.q[:, None], simulated.dq[:, None], ddq[:, None])
-    samples = {
-        "t": stretch.t - stretch.t[0],
-        "torque": stretch.tau,
-        "friction": fit.law.columns(motion, fit.joint, fit.theta) @ fit.amplitudes,
-        "gravity": gravity_columns(stretch.q, stretch.revolute) @ np.array(fit.gravity),
-        "inertial": fit.inertia * ddq,
-        "q": stretch.q,
-        "dq": stretch.dq,
-        "q_with": simulated.q,
-        "dq_with": simulated.dq,
-        "q_without": driven.without.q,
-        "dq_without": driven.without.dq,
-    }
+    driven, stretch = joint.driven, joint.driven.stretch
     every = max(1, len(stretch.t) // POINTS)
-    thin = {name: np.asarray(x[::every]) for name, x in samples.items()}
-    return Series(*_curve(joint.fit, joint.covered.fastest), **thin)
+    samples = (stretch.t - stretch.t[0], stretch.dq, driven.with_friction.dq, driven.without.dq)
+    thin = (np.asarray(x[::every]) for x in samples)
+    return Series(*_curve(joint.fit, joint.covered.fastest), *thin)
 
 
 def several_results(found: SeveralFit, arm: Arm, validate: Motions) -> tuple[JointResult, ...]:
@@ -287,7 +260,7 @@ def several_results(found: SeveralFit, arm: Arm, validate: Motions) -> tuple[Joi
             undecided(ladder, slowest, fastest) if moves[j] else (_UNMOVED,),
             (slowest, fastest),
             names,
-            Series(*_curve(fit, fastest), *np.zeros((11, 0))),
+            Series(*_curve(fit, fastest), *np.zeros((4, 0))),
             moves[j],
         )
         results.append(result)

@@ -49,6 +49,7 @@ class _Run:
     torque: Array  # (rows,) [N m]
     rigid: Array  # (rows, parameters)
     mean: Callable[[Array], Array]  # of columns (samples, k) in each row
+    largest = float("inf")  # other joints load it without a bound
 
     def sampler(self, every: int, pointwise: bool) -> tuple[Motion, Callable[[Array], Array]]:
         del pointwise  # the low-pass needs all samples

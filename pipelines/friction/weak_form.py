@@ -8,10 +8,7 @@ No acceleration has to be reconstructed, a held command is integrated exactly, a
 friction, which smears an acceleration over the reach of every filter, is a kink of the speed at a
 known instant. Divided by its length, a row is a mean torque [N m].
 
-The integrals are sums over nodes: one node a sample's interval; eight where speed passes zero in
-it, for friction jumps there; two for several samples whose speed keeps its sign and most of its
-size. Those two lie at the samples' mean speed ± its standard deviation, the rule of Gauss for a
-speed that runs straight, and right in the mean however it runs.
+The integrals are sums over nodes: one a sample's interval, eight where speed passes zero in it.
 """
 
 from __future__ import annotations
@@ -39,7 +36,6 @@ Mask = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.intp]
 
 KINKED = 2  # numerics: order of a smoother for motion whose acceleration jumps
-GAUSS = 0.5 / 3.0**0.5  # numerics: of their time, from its middle: where two nodes lie
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,6 +199,11 @@ class Stretch:
         """Return the mean torque of every window (windows,) [N m]."""
         return np.asarray(np.diff(self.impulse[self.edges]) / self.length)
 
+    @property
+    def largest(self) -> float:
+        """Return the largest torque on the joint, rests and reversals included [N m]."""
+        return float(np.abs(self.mean_torque).max())
+
     @cached_property
     def torque(self) -> Array:
         """Return the mean torque of every window that is kept (rows,) [N m]."""
@@ -231,7 +232,7 @@ class Stretch:
 
     @cached_property
     def _laid(self) -> tuple[Motion, Array, Indices]:
-        return _nodes(self.t, self.q, self.dq, self.window)
+        return _nodes(self.t, self.q, self.dq)
 
     @property
     def nodes(self) -> Motion:
@@ -288,67 +289,27 @@ class Stretch:
         return dq, t - self.t[0]
 
 
-def _nodes(t: Array, q: Array, dq: Array, window: int) -> tuple[Motion, Array, Indices]:
-    """Place nodes along a motion; none is of samples on both sides of a multiple of `window`.
-
-    Args:
-        t, q, dq: (samples,) time, position and speed; speed runs straight from sample to sample.
+def _nodes(t: Array, q: Array, dq: Array) -> tuple[Motion, Array, Indices]:
+    """Place nodes along a motion whose speed runs straight from sample to sample.
 
     Returns:
         The nodes, the times between them (nodes + 1,) [s], and the sample before each (nodes,).
     """
-    change, middle = np.diff(dq), 0.5 * (dq[1:] + dq[:-1])
-    most = min(window, int(FRICTION.coarsest * (len(t) - 1) / float(t[-1] - t[0]) + 1e-9))
-    size = max(size for size in range(1, max(most, 1) + 1) if window % size == 0)
-    parts, span = np.ones(len(change), dtype=np.int8), np.ones(len(change), dtype=np.int8)
-    little = FRICTION.little * float(np.abs(dq).max())
-    mean, spread = np.zeros(0), np.zeros(0)
-    if size >= FRICTION.pair:
-        whole = len(change) // size * size
-        groups = middle[:whole].reshape(-1, size), change[:whole].reshape(-1, size)
-        steady, mean, spread = _steady(*groups, little)
-        parts[:whole].reshape(-1, size)[steady] = 0
-        parts[:whole:size][steady], span[:whole:size][steady] = 2, size
-    alone = np.flatnonzero(parts == 1)
-    jump = np.abs(change[alone])
-    turning = (np.abs(middle[alone]) < (FRICTION.near + 0.5) * jump) & (jump > little)
-    parts[alone[turning]] = FRICTION.parts
-    first = np.flatnonzero(parts > 0)
-    count = parts[first].astype(np.intp)
-    at = np.repeat(first, count)
-    step = np.arange(len(at)) - np.repeat(np.cumsum(count) - count, count)
-    reach, pair = span[at], span[at] > 1
-    part = 1.0 / np.repeat(count, count)
-    share = step * part
-    # in samples after `at`
-    place = np.where(pair, 0.5 + GAUSS * (2.0 * step - 1.0), share + 0.5 * part) * reach
-    begin, length = t[at], t[at + reach] - t[at]
-    below = place.astype(np.intp)
-    beyond, below = place - below, at + below
-    v = dq[at] + place * change[at]
-    run = np.flatnonzero(pair)
-    group = at[run] // size
-    away = np.copysign(spread[group], dq[at[run] + size] - dq[at[run]])
-    v[run] = mean[group] + np.where(step[run] == 0, -away, away)
-    ddq = (dq[at + reach] - dq[at]) / length
-    position = q[below] + beyond * (q[below + 1] - q[below])
-    motion = Motion(begin + place / reach * length, position[:, None], v[:, None], ddq[:, None])
-    return motion, np.append(begin + share * length, t[-1]), at
-
-
-def _steady(middle: Array, change: Array, little: float) -> tuple[Mask, Array, Array]:
-    """Return whether speed keeps its sign in groups of intervals, its mean and deviation (groups,).
-
-    Args:
-        middle, change: (groups, intervals) mean speed of an interval, and its change [rad/s].
-        little: a speed [rad/s] that does not count.
-    """
-    each = np.full(middle.shape[1], 1.0 / middle.shape[1])
-    mean = middle @ each
-    square = np.square(middle - mean[:, None]) @ each + np.square(change) @ each / 12.0
-    size = np.square(mean)
-    steady = (size > FRICTION.steady**2 * square) | (size + square < little**2 / 4.0)
-    return steady, mean, np.sqrt(square)
+    change, middle, length = np.diff(dq), 0.5 * (dq[1:] + dq[:-1]), np.diff(t)
+    jump = np.abs(change)
+    turning = np.abs(middle) < (FRICTION.near + 0.5) * jump
+    turning &= jump > FRICTION.little * float(np.abs(dq).max())
+    count = np.where(turning, FRICTION.parts, 1)
+    at = np.repeat(np.arange(len(count)), count)
+    first = (np.arange(len(at)) - np.repeat(np.cumsum(count) - count, count)) / count[at]
+    place = first + 0.5 / count[at]
+    v, position = dq[at] + place * change[at], q[at] + place * np.diff(q)[at]
+    nodes = np.stack([position, v, (change / length)[at]])[..., None]
+    return (
+        Motion(t[at] + place * length[at], *nodes),
+        np.append(t[at] + first * length[at], t[-1]),
+        at,
+    )
 
 
 def blocks_of_time(stretches: Sequence[Stretch], length: float) -> Indices:
