@@ -15,7 +15,7 @@ where a model fitted to the motion leaves far more of them (`moving_rows`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -46,8 +46,6 @@ from pipelines.estimation.least_squares import (
     errors,
     fit,
     gather,
-    gather_growing,
-    split,
 )
 from pipelines.estimation.motion import Motions, Reconstructed, Reconstruction, reconstruct
 from pipelines.estimation.regression import (
@@ -70,7 +68,7 @@ _KEPT = 4 << 20  # numerics: [B] of conditioned equations; longer ones are made 
 class Stacked:
     """The equations of several logs, one after the other; kept in memory where they are few."""
 
-    def __init__(self, logs: Sequence[Iterable[Block]]) -> None:
+    def __init__(self, logs: Sequence[LogEquations]) -> None:
         self.logs = logs
         self._kept: list[Block] = []
 
@@ -88,11 +86,6 @@ class Stacked:
                     kept.clear()
                 yield block
         self._kept = kept
-
-    @property
-    def of_logs(self) -> list[LogEquations]:
-        """The equations of each log."""
-        return [one for one in self.logs if isinstance(one, LogEquations)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,12 +133,10 @@ class Estimate:
 
     def convergence(self) -> Convergence:
         """Return how the estimates settle as samples come in, Fig. 12."""
-        blocks = split(self.equations, max(1, self.statistics.samples // _CONFIG.parts))
-        parts = gather_growing(blocks, _CONFIG.parts)
-        return convergence(parts, self.solution, self.robust.inflation)
+        return convergence(self.equations, self.solution, _CONFIG.parts, self.robust.inflation)
 
 
-def estimate(logs: Sequence[Iterable[Block]], columns: Columns, weighted: bool = True) -> Estimate:
+def estimate(logs: Sequence[LogEquations], columns: Columns, weighted: bool = True) -> Estimate:
     """Fit the equations of `logs`; without `weighted` every joint counts alike, as in eq. (15)."""
     stacked = Stacked(logs)
     weights = None if weighted else np.ones(columns.body.robot.n_joints)
@@ -362,7 +353,7 @@ def judge(
         equations = equations_of(motions, fitted.recipe, found.columns, rows)
         left = errors(gather(Stacked(equations)), found.beta)
         return Judged(_of_whole_torque(left, equations), "logs", motions, tuple(equations))
-    own = found.equations.of_logs
+    own = found.equations.logs
     left = by_blocks(
         found.equations,
         found.statistics.samples,

@@ -142,7 +142,7 @@ def negative_viscous(
     laws = everywhere(coulomb, columns.body.robot.revolute)
     wide = [replace(law, sharpness=widest) for law in laws]  # type: ignore[call-arg]
     columns = replace(columns, laws=(*columns.laws, *wide))
-    logs = [replace(log, columns=columns) for log in equations_of_logs(found)]
+    logs = [replace(log, columns=columns) for log in found.equations.logs]
     sure = _negative(estimate(logs, columns), config.least_std)
     checks, names = [], found.columns.names
     for k in (k for k in places if k in sure):
@@ -161,11 +161,6 @@ def _negative(found: Estimate, least: float) -> Sequence[int]:
     below = found.trusted & (found.beta < -least * found.std)
     names = enumerate(found.columns.names)
     return [k for k, column in names if column.name.startswith("viscous:") and below[k]]
-
-
-def equations_of_logs(found: Estimate) -> list[LogEquations]:
-    """Return the equations that an estimate was made of."""
-    return [log for log in found.equations.logs if isinstance(log, LogEquations)]
 
 
 def excited(subject: Subject) -> Sequence[Check | NotTested]:

@@ -16,7 +16,7 @@ Kostić et al. 2004, eq. (12)-(15), with every channel weighted by its own resid
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from itertools import accumulate, pairwise
@@ -82,13 +82,6 @@ class Block:
         """Return y - A β (channels, samples)."""
         rows = zip(self.columns, self.values, self.y, strict=True)
         return np.array([y - beta[index] @ values for index, values, y in rows])
-
-
-def split(equations: Iterable[Block], samples: int) -> Iterator[Block]:
-    """Yield the same equations in blocks of at most this many samples."""
-    for block in equations:
-        for first in range(0, block.samples, samples):
-            yield block.part(slice(first, first + samples))
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,28 +191,6 @@ def _collected(
     if not samples:
         raise ValueError("no equations")
     return Statistics(table, counts, samples, longest, triangular)
-
-
-def gather_growing(equations: Iterable[Block], parts: int = 24) -> list[Statistics]:
-    """Return the sums of consecutive parts of one block or more, `parts` to twice as many.
-
-    Neighbouring parts are joined as soon as there are too many, so that memory stays constant.
-    """
-    done: list[Statistics] = []
-    size = held = 1
-    for block in equations:
-        if held < size:
-            done[-1] = done[-1] + gather([block])
-            held += 1
-            continue
-        if len(done) == 2 * parts:
-            done = [a + b for a, b in zip(done[::2], done[1::2], strict=True)]
-            size *= 2
-        done.append(gather([block]))
-        held = 1
-    if not done:
-        raise ValueError("no equations")
-    return done
 
 
 @dataclass(frozen=True, eq=False)
@@ -361,17 +332,18 @@ class Convergence:
 
 
 def convergence(
-    parts: Sequence[Statistics], solution: Solution, inflation: Array | float = 1.0
+    equations: Iterable[Block], solution: Solution, parts: int, inflation: Array | float = 1.0
 ) -> Convergence:
-    """Return the series over the growing sums of consecutive `parts`; no sample is read again.
+    """Return the series over the growing sums of so many `parts`, in one pass.
 
     Args:
         solution: of all of them; its weights, and so its noise, hold throughout.
         inflation: (k,) what the residual's memory adds to standard deviations.
     """
     unit = inflation * np.sqrt(np.mean(solution.weights * np.square(solution.sigma)))
+    cuts = np.unique(np.linspace(0, solution.errors.samples, parts + 1).astype(np.intp))
     samples, beta, std = list[int](), list[Array](), list[Array]()
-    for upto in accumulate(parts, add):
+    for upto in accumulate(_between(equations, cuts, gather), add):
         found = solve(upto, weights=solution.weights)
         known = 1.0 if found.condition < _ENOUGH else np.nan
         samples.append(upto.samples)

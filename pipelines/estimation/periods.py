@@ -416,11 +416,10 @@ def residuals(
     Args:
         scatter: of `logs`, those fitted before those that judge.
     """
-    own = [one for one in fitted.estimate.equations.logs if isinstance(one, LogEquations)]
     sources = [log for log, _ in (*fitted.motions, *judged.motions)]
     found = []
     for both, one, log, source in zip(
-        scatter, (*own, *judged.equations), logs, sources, strict=True
+        scatter, (*fitted.estimate.equations.logs, *judged.equations), logs, sources, strict=True
     ):
         if both is None:
             continue

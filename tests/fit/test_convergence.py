@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipelines.estimation.least_squares import convergence, fit, gather_growing, split
+from pipelines.estimation.least_squares import convergence, fit
 from tests.fit.problems import problem, white
 
 
@@ -12,9 +12,8 @@ def test_series_is_the_fit_of_the_first_samples() -> None:
     """Each point is what a fit of the samples so far gives with the same weights; the last is the fit itself."""
     one = problem()
     y = one.clean + white(np.random.default_rng(0), len(one.Y))
-    blocks = list(split(one.blocks(y), 250))
-    whole = fit(blocks).solution
-    series = convergence(gather_growing(blocks, parts=20), whole)
+    whole = fit(one.blocks(y)).solution
+    series = convergence(one.blocks(y), whole, parts=20)
     assert series.samples == tuple(range(250, 5001, 250))
     np.testing.assert_allclose(series.beta[-1], whole.beta, rtol=1e-9)
     np.testing.assert_allclose(series.std[-1], whole.std, rtol=1e-2)
@@ -29,9 +28,8 @@ def test_estimates_settle_within_their_std() -> None:
     """The truth lies within four std all along, and std fall; before there is enough to solve, there is no number."""
     one = problem()
     y = one.clean + white(np.random.default_rng(1), len(one.Y))
-    blocks = list(split(one.blocks(y), 2))
-    whole = fit(blocks).solution
-    series = convergence(gather_growing(blocks[:2], parts=20) + gather_growing(blocks[2:], parts=20), whole)
+    whole = fit(one.blocks(y)).solution
+    series = convergence(one.blocks(y), whole, parts=1250)
     assert np.isnan(series.beta[0]).all()
     known = ~np.isnan(series.beta[:, 0])
     z = (series.beta[known] - one.beta) / series.std[known]

@@ -11,9 +11,7 @@ from pipelines.estimation.least_squares import (
     errors,
     fit,
     gather,
-    gather_growing,
     solve,
-    split,
     triangulate,
 )
 from pipelines.io.log import Array
@@ -169,15 +167,3 @@ def test_silence_is_answered_with_zero() -> None:
     assert not fit(one.blocks(np.zeros_like(y))).solution.beta.any()
     with pytest.raises(ValueError, match="no equations"):
         fit([])
-
-
-@pytest.mark.parametrize("size", [1, 10, 100])
-def test_growing_parts_are_few_and_complete(size: int) -> None:
-    """However many blocks there are, there are at most twice as many parts as asked for, and no sample is lost."""
-    one, y = noisy()
-    parts = gather_growing(split(one.blocks(y), size), parts=12)
-    assert min(12, len(y) // size) <= len(parts) <= 24
-    assert sum(part.samples for part in parts) == len(y)
-    assert len({part.samples for part in parts[:-1]}) == 1
-    total = np.sum([part.gram for part in parts], axis=0)
-    np.testing.assert_allclose(total, gather(one.blocks(y)).gram, rtol=1e-9, atol=1e-9)

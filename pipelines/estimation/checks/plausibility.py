@@ -35,10 +35,10 @@ from pipelines.estimation.checks.boundary import (
 from pipelines.estimation.checks.rows import (
     Row,
     Sampled,
-    SharedRows,
     relative_residual,
     row_fits,
     sample_motion,
+    shared_residual,
 )
 from pipelines.estimation.config import PlausibilityConfig
 from pipelines.estimation.judgements import excited
@@ -241,8 +241,7 @@ class Evidence:
 
     def together(self, motion: Sampled) -> Array:
         """(telling joints,) residual where all rows share the rigid body's parameters."""
-        shared = SharedRows.of(self.body, motion, self.telling.tolist())
-        return shared.left(np.ones(len(self.telling)))
+        return shared_residual(self.body, motion, self.telling.tolist())
 
 
 def plausibility(subject: Subject) -> tuple[Check, ...]:

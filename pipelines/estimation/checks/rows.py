@@ -34,6 +34,11 @@ from pipelines.quality.segments import Mask, Usable
 
 _CONFIG = PlausibilityConfig()
 _RANK = 1e-10  # numerics: of the largest eigenvalue, of equilibrated columns: less is rounding
+_BOUNDARY = BoundaryConfig()
+_ELSEWHERE = np.array([3.1, -5.3, 7.7])  # [m/s^2] along no axis: shows all that any gravity shows
+_SEED = 20040509  # numerics
+_OVERLAP = 6  # numerics: moments that are kept within the length of the filter: no aliasing
+_RIDGE = 1e-6  # numerics: of equilibrated columns, for a first estimate of the load alone
 
 
 @dataclass(frozen=True)
@@ -181,52 +186,29 @@ def relative_residual(rows: Sequence[Row], tau: Array) -> Array:
     return np.asarray(left / np.where(size > 0, size, 1.0))
 
 
-@dataclass(frozen=True)
-class SharedRows:
-    """Rows that share the rigid body's parameters, each over its torque's size, its own columns
-    taken out. A row by itself takes a wrong scale for other parameters; together they cannot.
+def shared_residual(body: RigidBody, motion: Sampled, joints: Sequence[int]) -> Array:
+    """Return the relative residual (joints,) of rows that share the rigid body's parameters.
+
+    min over β of Σ_j |τ_j - Φ_j β|² / |τ_j|², each joint's own columns taken out. A row by itself
+    takes a wrong scale for other parameters; together they cannot.
     """
-
-    gram: Array  # (joints, parameters, parameters)
-    side: Array  # (joints, parameters)
-    square: Array  # (joints,)
-
-    @classmethod
-    def of(cls, body: RigidBody, motion: Sampled, joints: Sequence[int]) -> SharedRows:
-        regressor, tau = body.regressor(motion.q, motion.dq, motion.ddq), motion.tau
-        scale = np.sqrt(np.sum(regressor**2, axis=(0, 1)))
-        regressor = regressor / np.where(scale > 0.0, scale, 1.0)
-        parts = []
-        for j in joints:
-            own = _own(motion, j)
-            own, _ = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))
-            size = float(np.linalg.norm(tau[:, j] - tau[:, j].mean())) or 1.0
-            whole = np.column_stack([regressor[:, j], tau[:, j]]) / size
-            whole -= own @ (own.T @ whole)
-            parts.append(whole.T @ whole)
-        gram = np.array(parts)
-        return cls(gram[:, :-1, :-1], gram[:, :-1, -1], gram[:, -1, -1])
-
-    def left(self, factors: Array) -> Array:
-        """Return the relative residual (joints,) if torque j is `factors` j times what it seems.
-
-        min over β of Σ_j |τ_j - f_j Φ_j β|²
-        """
-        gram, side = np.einsum("j,jab->ab", factors**2, self.gram), factors @ self.side
-        size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-        values, vectors = np.linalg.eigh(gram / size / size[:, None])
-        seen = values > 1e-12 * values[-1] * len(values)
-        beta = (vectors[:, seen] / values[seen]) @ (vectors[:, seen].T @ (side / size)) / size
-        rest = self.square - 2.0 * factors * (self.side @ beta)
-        rest += factors**2 * np.einsum("a,jab,b->j", beta, self.gram, beta)
-        return np.asarray(np.sqrt(np.maximum(rest, 0.0)))
-
-
-_ELSEWHERE = np.array([3.1, -5.3, 7.7])  # [m/s^2] along no axis: shows all that any gravity shows
-_SEED = 20040509  # numerics
-_OVERLAP = 6  # numerics: moments that are kept within the length of the filter: no aliasing
-_RIDGE = 1e-6  # numerics: of equilibrated columns, for a first estimate of the load alone
-_BOUNDARY = BoundaryConfig()
+    regressor, parts = body.regressor(motion.q, motion.dq, motion.ddq), []
+    for j in joints:
+        own, tau = _own(motion, j), motion.tau[:, j]
+        own, _ = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))
+        whole = np.column_stack([regressor[:, j], tau])
+        whole /= float(np.linalg.norm(tau - tau.mean())) or 1.0
+        parts.append(whole - own @ (own.T @ whole))
+    rows = np.array(parts)
+    table, torque = rows[:, :, :-1], rows[:, :, -1]
+    columns = table.reshape(-1, table.shape[2])
+    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-150)
+    unit = columns / size
+    values, vectors = np.linalg.eigh(unit.T @ unit)
+    seen = values > 1e-12 * values[-1] * len(values)
+    turned = vectors[:, seen].T @ (unit.T @ torque.ravel())
+    beta = (vectors[:, seen] / values[seen]) @ turned / size
+    return np.asarray(np.linalg.norm(torque - table @ beta, axis=1))
 
 
 @dataclass(frozen=True, eq=False)
