@@ -26,7 +26,6 @@ from pipelines.excitation.problem import DesignProblem
 from pipelines.excitation.regressor import grams_of
 from pipelines.excitation.task import Task
 from pipelines.excitation.verify import Peak, worst
-from pipelines.simulation.fourier_series import good_size
 
 __all__ = ["Design", "Effort", "design", "final_problem", "finished", "landscape"]
 
@@ -63,11 +62,13 @@ class Design:
 
 def landscape(task: Task, share: int = 1, density: int = CONFIG.density) -> DesignProblem:
     """Return the problem on a `share`-th of the harmonics, `density` samples for each."""
+    from scipy.fft import next_fast_len
+
     top = task.harmonics.used.shape[1]
     few = task.harmonics if share == 1 else task.harmonics.up_to(max(min(top, 5), top // share))
     space = MotionSpace(few, task.speed, rest=task.rest, home=task.home)
     least = CONFIG.fewest_samples * density // CONFIG.density
-    samples = good_size(max(density * few.used.shape[1], least))
+    samples = next_fast_len(max(density * few.used.shape[1], least), real=True)
     return DesignProblem(task.problem, space, samples, task.around, CONFIG.room)
 
 
@@ -85,8 +86,9 @@ class _Search:
         self.x: Array | None = None
         self._begun, self._last = time.process_time(), 0.0
 
-    def descend(self, land: DesignProblem, x: Array, rounds: Sequence[Round],
-                best: bool) -> tuple[float, Array]:
+    def descend(
+        self, land: DesignProblem, x: Array, rounds: Sequence[Round], best: bool
+    ) -> tuple[float, Array]:
         """Refine x; return the best exact figure on the way and its point; `best`: it may be the
         answer."""
         from scipy.optimize import minimize
@@ -108,9 +110,19 @@ class _Search:
             return value, gradient
 
         for one in rounds:
-            x = minimize(function, x, args=(one,), jac=True, method="L-BFGS-B", options={
-                "maxiter": one.iterations, "maxcor": PAIRS, "gtol": 0.0,
-                "ftol": FINE if best else ROUGH}).x
+            x = minimize(
+                function,
+                x,
+                args=(one,),
+                jac=True,
+                method="L-BFGS-B",
+                options={
+                    "maxiter": one.iterations,
+                    "maxcor": PAIRS,
+                    "gtol": 0.0,
+                    "ftol": FINE if best else ROUGH,
+                },
+            ).x
         return own
 
     @property
@@ -141,8 +153,10 @@ class _Search:
             number = np.exp(self.score - FAR)
             return f"evaluation {self.done}: condition number {number:.3f} so far"
         name = "number" if goal.criterion == "condition" else "criterion"
-        return (f"evaluation {self.done}: best {goal.criterion} {name} {self.score:.4f}, found at "
-                f"{self.found_at}")
+        return (
+            f"evaluation {self.done}: best {goal.criterion} {name} {self.score:.4f}, found at "
+            f"{self.found_at}"
+        )
 
     def run(self, coarse: DesignProblem, fine: DesignProblem, rng: np.random.Generator) -> None:
         """Search until the budget is spent."""
@@ -156,10 +170,12 @@ class _Search:
                 self.descend(fine, lifted, glance, best=True)  # an early end has something to keep
                 starts.append((score, lifted))
             starts.sort(key=lambda start: start[0])
-            pool += [self.descend(fine, x, CONFIG.lifted, best=True)
-                     for _, x in starts[:CONFIG.lifted_starts]]
+            pool += [
+                self.descend(fine, x, CONFIG.lifted, best=True)
+                for _, x in starts[: CONFIG.lifted_starts]
+            ]
             for place, size in CONFIG.turns:
-                pool = sorted(pool, key=lambda member: member[0])[:CONFIG.pool]
+                pool = sorted(pool, key=lambda member: member[0])[: CONFIG.pool]
                 place = min(place, len(pool) - 1)
                 x = fine.disturbed(pool[place][1], size, rng)
                 found = self.descend(fine, x, CONFIG.again, best=True)
@@ -222,9 +238,12 @@ def _refuse_impossible(task: Task, fine: DesignProblem, rng: np.random.Generator
         place = f"the {limit.quantity} limit of joint {limit.joint}"
     home = "" if task.home is None else f" at home ({', '.join(f'{q:.4g}' for q in task.home)})"
     raise UsageError(
-        "C08", f"no motion keeps {place}, {limit.low:.4g} to {limit.high:.4g} {limit.unit}: at a "
-        f"standstill{home} it is exceeded already", where="limits",
-        remedy="start elsewhere (--home), or correct that limit")
+        "C08",
+        f"no motion keeps {place}, {limit.low:.4g} to {limit.high:.4g} {limit.unit}: at a "
+        f"standstill{home} it is exceeded already",
+        where="limits",
+        remedy="start elsewhere (--home), or correct that limit",
+    )
 
 
 def _smaller(task: Task, final: DesignProblem, x: Array) -> tuple[Array, float]:
@@ -241,13 +260,17 @@ def _smaller(task: Task, final: DesignProblem, x: Array) -> tuple[Array, float]:
 
 def _peaks(task: Task, trajectory: Trajectory) -> tuple[Peak, ...]:
     """Return the peaks of one period, and of the run-in and run-out where there are any."""
+    from scipy.fft import next_fast_len
+
     series = trajectory.series
-    found = [task.peaks(series.samples(good_size(round(series.period / CONFIG.grid))),
-                        periodic=True)]
+    count = next_fast_len(round(series.period / CONFIG.grid), real=True)
+    found = [task.peaks(series.samples(count), periodic=True)]
     if trajectory.run_in > 0.0:
         t = CONFIG.grid * np.arange(round(trajectory.run_in / CONFIG.grid) + 1, dtype=np.float64)
-        found += [task.peaks(trajectory.at(at), periodic=False)
-                  for at in (t, trajectory.duration - t[::-1])]
+        found += [
+            task.peaks(trajectory.at(at), periodic=False)
+            for at in (t, trajectory.duration - t[::-1])
+        ]
     return tuple(max(group, key=lambda peak: peak.share) for group in zip(*found, strict=True))
 
 
@@ -271,5 +294,9 @@ def _with_run_in(task: Task, trajectory: Trajectory) -> Trajectory:
         duration *= longer
     of = f" of joint {nearest.joint}" if nearest is not None and nearest.joint else ""
     quantity = "" if nearest is None else nearest.quantity
-    raise UsageError("C08", f"no run-in of up to {longest:g} s keeps the {quantity} limit{of}",
-                     where="--no-rest", remedy="start at rest, or from another home")
+    raise UsageError(
+        "C08",
+        f"no run-in of up to {longest:g} s keeps the {quantity} limit{of}",
+        where="--no-rest",
+        remedy="start at rest, or from another home",
+    )

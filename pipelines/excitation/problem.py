@@ -14,15 +14,9 @@ from functools import cached_property
 import numpy as np
 
 from pipelines.dynamics.body import Array
-from pipelines.dynamics.kinematics import SerialChain
+from pipelines.dynamics.kinematics import SerialChain, jacobian, tip_position
 from pipelines.excitation.config import CONFIG
-from pipelines.excitation.constraints import (
-    Limit,
-    TipMotion,
-    barrier,
-    middle_and_half,
-    tip_motion,
-)
+from pipelines.excitation.constraints import Limit, barrier, middle_and_half
 from pipelines.excitation.criteria import Goal
 from pipelines.excitation.fourier import MotionSpace
 from pipelines.excitation.regressor import ArmColumns, grams_of_rows
@@ -47,41 +41,45 @@ class ArmProblem:
     @cached_property
     def limited(self) -> tuple[Array, ...]:
         """Joints with a limit of position, speed, acceleration and torque."""
-        return tuple(np.array([one.joint - 1 for one in self.limits
-                               if one.quantity == name and one.joint], dtype=np.intp)
-                     for name in ("position", "speed", "acceleration", "torque"))
+        return tuple(
+            np.array(
+                [one.joint - 1 for one in self.limits if one.quantity == name and one.joint],
+                dtype=np.intp,
+            )
+            for name in ("position", "speed", "acceleration", "torque")
+        )
 
     def torque(self, rows: Sequence[Array], dq: Array) -> Array:
         """Return τ (joints, samples) of the model."""
         assert self.beta is not None
-        tau = np.stack([self.beta[own] @ row
-                        for own, row in zip(self.columns.columns, rows, strict=True)])
+        tau = np.stack(
+            [self.beta[own] @ row for own, row in zip(self.columns.columns, rows, strict=True)]
+        )
         if self.drag is None:
             return tau
         return tau + self.drag[:, :1] * np.tanh(CONFIG.sharpness * dq) + self.drag[:, 1:] * dq
 
-    def signals(self, motion: Array, rows: Sequence[Array]) -> tuple[Array, TipMotion | None]:
-        """Return the limited signals (limits, samples), of the tip's speed its square."""
+    @property
+    def boxed(self) -> bool:
+        """Return whether the tip has a box."""
+        return any(one.joint is None for one in self.limits)
+
+    def signals(self, motion: Array, rows: Sequence[Array]) -> Array:
+        """Return the limited signals (limits, samples)."""
         *moving, torque = self.limited
         parts = [signal[own] for signal, own in zip(motion, moving, strict=True)]
         if len(torque):
             parts.append(self.torque(rows, motion[1])[torque])
-        tip, of_tip = None, [one.quantity for one in self.limits if one.joint is None]
-        if of_tip:
-            tip = tip_motion(self.chain, motion[0], motion[1])
-            if "tip speed" in of_tip:
-                parts.append((tip.velocity**2).sum(axis=0)[None])
-            if "tip x" in of_tip:
-                parts.append(tip.position)
-        return np.concatenate(parts), tip
+        if self.boxed:
+            parts.append(tip_position(self.chain, motion[0].T).T)
+        return np.concatenate(parts)
 
-    def adjoint(self, motion: Array, tip: TipMotion | None, bars: Array,
-                on_rows: Sequence[Array]) -> Array:
+    def adjoint(self, motion: Array, bars: Array, on_rows: Sequence[Array]) -> Array:
         """Return the derivative by the motion (3, joints, samples), adding torque to `on_rows`."""
         out, on_torque = np.zeros_like(motion), np.zeros_like(motion[0])
         first = 0
         for target, own in zip((*out, on_torque), self.limited, strict=True):
-            target[own] += bars[first:first + len(own)]
+            target[own] += bars[first : first + len(own)]
             first += len(own)
         if self.drag is not None:
             level = np.tanh(CONFIG.sharpness * motion[1])
@@ -90,24 +88,23 @@ class ArmProblem:
         if self.beta is not None:
             for own, bar, row in zip(self.columns.columns, on_torque, on_rows, strict=True):
                 row += self.beta[own, None] * bar
-        if tip is not None:
-            on_speed, on_place = np.zeros_like(tip.velocity), np.zeros_like(tip.position)
-            if any(one.quantity == "tip speed" for one in self.limits):
-                on_speed = 2.0 * bars[first] * tip.velocity
-                first += 1
-            if first < len(bars):
-                on_place = bars[first:]
-            by_q, by_dq = tip.adjoint(motion[1], on_place, on_speed)
-            out[0] += by_q
-            out[1] += by_dq
+        if self.boxed:
+            linear = jacobian(self.chain, motion[0].T)[:, :3]
+            out[0] += np.einsum("saj,as->js", linear, bars[first:])
         return np.asarray(out + self.columns.adjoint(motion, on_rows))
 
 
 class DesignProblem:
     """The problem on one space of motions, sampled `samples` times a period."""
 
-    def __init__(self, arm: ArmProblem, space: MotionSpace, samples: int,
-                 around: tuple[Array, Array], room: float = 1.0) -> None:
+    def __init__(
+        self,
+        arm: ArmProblem,
+        space: MotionSpace,
+        samples: int,
+        around: tuple[Array, Array],
+        room: float = 1.0,
+    ) -> None:
         """Centre random motions between the postures `around`, within `room` of the limits."""
         self.arm, self.space, self.samples, self.around = arm, space, samples, around
         self.middle, half = middle_and_half(arm.limits)
@@ -119,19 +116,21 @@ class DesignProblem:
         """Return the criterion with its barrier, the gradient, and the figure, infinite outside
         limits."""
         arm = self.arm
-        motion, rows, signals, tip = self._evaluated(x)
+        motion, rows, signals = self._evaluated(x)
         wall, on_signals, inside = barrier(signals, self.middle, self.half)
         grams = grams_of_rows(arm.columns, rows)
         value, on_grams, score = arm.goal.value(grams, sharpness)
-        bars = [(2.0 / self.samples) * (on_grams[j][np.ix_(own, own)] @ row)
-                for j, (own, row) in enumerate(zip(arm.columns.columns, rows, strict=True))]
-        gradient = self.space.gradient(arm.adjoint(motion, tip, weight * on_signals, bars))
+        bars = [
+            (2.0 / self.samples) * (on_grams[j][np.ix_(own, own)] @ row)
+            for j, (own, row) in enumerate(zip(arm.columns.columns, rows, strict=True))
+        ]
+        gradient = self.space.gradient(arm.adjoint(motion, weight * on_signals, bars))
         return value + weight * wall, gradient, score if inside else np.inf
 
-    def _evaluated(self, x: Array) -> tuple[Array, tuple[Array, ...], Array, TipMotion | None]:
+    def _evaluated(self, x: Array) -> tuple[Array, tuple[Array, ...], Array]:
         motion = self.space.motion(x, self.samples)
         rows = self.arm.columns.rows(motion)
-        return motion, rows, *self.arm.signals(motion, rows)
+        return motion, rows, self.arm.signals(motion, rows)
 
     def nearness(self, x: Array) -> Array:
         """Return how near each limit is approached (limits,): 1 is the limit."""

@@ -14,9 +14,9 @@ import numpy as np
 
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.body import Array, Motion
-from pipelines.dynamics.kinematics import SerialChain
+from pipelines.dynamics.kinematics import SerialChain, tip_position
 from pipelines.excitation.config import CONFIG
-from pipelines.excitation.constraints import Limit, tip_motion
+from pipelines.excitation.constraints import Limit
 from pipelines.simulation import fourier_series as fourier
 
 __all__ = ["Peak", "peaks", "torque_of", "worst"]
@@ -36,8 +36,9 @@ class Peak:
     share: float  # 1 is the limit: of the way from the middle of the range, or from zero
 
 
-def peaks(limits: Iterable[Limit], chain: SerialChain, motion: Array, arm: Arm | None, *,
-          periodic: bool) -> tuple[Peak, ...]:
+def peaks(
+    limits: Iterable[Limit], chain: SerialChain, motion: Array, arm: Arm | None, *, periodic: bool
+) -> tuple[Peak, ...]:
     """Return the peaks of motion (3, joints, samples) on the grid of `CONFIG.grid`.
 
     Args:
@@ -47,22 +48,15 @@ def peaks(limits: Iterable[Limit], chain: SerialChain, motion: Array, arm: Arm |
     limits = tuple(limits)
     quantities = {one.quantity for one in limits}
     tau = torque_of(arm, motion) if arm is not None and "torque" in quantities else motion[0]
-    tip = tip_motion(chain, *motion[:2]) if any(x.joint is None for x in limits) else None
+    signals = dict(zip((*MOTION, "torque"), (*motion, tau), strict=True))
+    if any(one.joint is None for one in limits):
+        tip = tip_position(chain, motion[0].T).T
+        signals |= {f"tip {axis}": place[None] for axis, place in zip("xyz", tip, strict=True)}
     found = []
     for one in limits:
-        if one.quantity in MOTION and one.joint is not None:
-            signal = motion[MOTION.index(one.quantity), one.joint - 1]
-            bound = fourier.periodic_peak if periodic else _between
-        else:
-            bound = _between
-            if one.joint is not None:
-                signal = tau[one.joint - 1]
-            else:
-                assert tip is not None
-                place = "xyz".find(one.quantity[-1])
-                speed = np.linalg.norm(tip.velocity, axis=0)
-                signal = speed if one.quantity == "tip speed" else tip.position[place]
-        low, high = map(float, bound(signal))
+        exact = periodic and one.quantity in MOTION
+        bound = fourier.periodic_peak if exact else _between
+        low, high = map(float, bound(signals[one.quantity][(one.joint or 1) - 1]))
         found.append(_peak(one, low, high))
     return tuple(found)
 
@@ -83,11 +77,19 @@ def _peak(one: Limit, low: float, high: float) -> Peak:
     middle = 0.5 * (one.low + one.high)
     if not np.isfinite(middle):  # open at one end
         middle = one.high - 1.0 if np.isfinite(one.high) else one.low + 1.0
-    shares = [(value - middle) / (end - middle) if np.isfinite(end) else -np.inf
-              for value, end in ((low, one.low), (high, one.high))]
+    shares = [
+        (value - middle) / (end - middle) if np.isfinite(end) else -np.inf
+        for value, end in ((low, one.low), (high, one.high))
+    ]
     upper = shares[1] >= shares[0]
-    return Peak(one.joint, one.quantity, high if upper else low, one.high if upper else one.low,
-                one.unit, float(max(shares)))
+    return Peak(
+        one.joint,
+        one.quantity,
+        high if upper else low,
+        one.high if upper else one.low,
+        one.unit,
+        float(max(shares)),
+    )
 
 
 def worst(found: Iterable[Peak]) -> Peak | None:

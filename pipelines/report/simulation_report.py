@@ -10,8 +10,7 @@ from pipelines.report.document import document
 from pipelines.report.figures import Array, joint_signal_figure, signals_figure
 from pipelines.report.report import Figure, Report
 from pipelines.report.style import format_number
-from pipelines.simulation.course import Course
-from pipelines.simulation.imitate import Imitation
+from pipelines.simulation.imitate import Course, Imitation
 
 
 def simulation_report(

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["FourierSeries", "adjoint", "degree_of", "good_size", "periodic_peak", "synthesise"]
+__all__ = ["FourierSeries", "adjoint", "degree_of", "periodic_peak", "synthesise"]
 
 Array = npt.NDArray[np.float64]
 
@@ -58,20 +58,6 @@ class FourierSeries:
             out[1] += a * c + b * s
             out[2] += w * (b * c - a * s)
         return out
-
-
-def good_size(least: int) -> int:
-    """Return the smallest 2^i 3^j 5^k from `least` on: a fast length of a Fourier transform."""
-    best = 1 << max(1, (least - 1).bit_length())
-    five = 1
-    while five < best:
-        three = five
-        while three < best:
-            two = three << max(0, (-(-least // three) - 1).bit_length())
-            best = min(best, two)
-            three *= 3
-        five *= 5
-    return best
 
 
 def synthesise(offset: Array, cosine: Array, sine: Array, omega: Array, count: int) -> Array:

@@ -21,13 +21,33 @@ from pipelines.io.option import option
 from pipelines.io.results import NOT_STORED
 from pipelines.simulation.closed_loop import Noise, Simulated, run
 from pipelines.simulation.config import SIMULATION
-from pipelines.simulation.course import Course, course
 from pipelines.simulation.experiment import Experiment
 from pipelines.simulation.plant import Plant
 from pipelines.simulation.replay import held_torque, simulate_windows
 from pipelines.simulation.step import choose_step
 
-__all__ = ["How", "Imitation", "imitate"]
+__all__ = ["Course", "How", "Imitation", "imitate"]
+
+
+Pair = tuple[Array, Array]
+
+
+@dataclass(frozen=True)
+class Course:
+    """Measured and simulated signals (points, joints).
+
+    t has two points a stretch, its lowest and its highest sample.
+    """
+
+    t: Array  # [s] (points,)
+    position: Array  # [rad] measured
+    position_simulated: Array
+    position_difference: Array  # simulated minus measured
+    speed: Array  # [rad/s] reconstructed
+    speed_simulated: Array
+    torque: Array | None = None  # [N m] commanded
+    torque_simulated: Array | None = None
+    torque_difference: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -172,7 +192,7 @@ def _in_loop(
         position_max=np.nanmax(np.abs(done.q - log.q), axis=(0, 1)),
         speed_rms=_rms(done.true_dq - speed),
         torque_rms=_rms(done.tau - log.tau) if "tau" in log else None,
-        course=course(log, q, dq, (log.tau, done.tau[0])) if draw else None,
+        course=_course(log, q, dq, (log.tau, done.tau[0])) if draw else None,
     )
 
 
@@ -194,7 +214,7 @@ def _in_windows(
         speed_rms=_rms((windows.dq - motion.dq)[None]),
         steps=windows.steps,
         window=length * log.sample_time,
-        course=course(log, q, dq, None) if draw else None,
+        course=_course(log, q, dq, None) if draw else None,
     )
 
 
@@ -219,3 +239,23 @@ def _simulated_log(
     return replace(
         log, name=name, origin="simulated", torque=None, signals=taken | signals, derived=about
     )
+
+
+def _course(log: ExperimentLog, q: Pair, dq: Pair, tau: Pair | None) -> Course:
+    """Return the series of one log; each pair is measured and simulated (samples, joints)."""
+    size = max(1, -(-log.n_samples // SIMULATION.stretches))
+    first = np.arange(0, log.n_samples, size)
+    middle = np.minimum(first + size // 2, log.n_samples - 1)
+    t = np.stack([log.t[first], log.t[middle]], axis=1).ravel()
+    torque = () if tau is None else (*tau, tau[1] - tau[0])
+    series = (*q, q[1] - q[0], *dq, *torque)
+    return Course(t, *(_envelope(x, size) for x in series))
+
+
+def _envelope(x: Array, size: int) -> Array:
+    """(2 stretches, joints): lowest and highest of each `size` samples, NaN without any."""
+    first = np.arange(0, len(x), size)
+    low = np.minimum.reduceat(np.where(np.isnan(x), np.inf, x), first, axis=0)
+    high = np.maximum.reduceat(np.where(np.isnan(x), -np.inf, x), first, axis=0)
+    both = np.stack([low, high], axis=1).reshape(-1, x.shape[1])
+    return np.where(np.isfinite(both), both, np.nan)

@@ -76,17 +76,16 @@ def test_limits_hold_on_a_fine_grid(default: tuple[Task, Design]) -> None:
     assert stated["torque", 2] == pytest.approx(np.abs(tau[1]).max(), rel=1e-3)
 
 
-def test_a_box_and_a_speed_for_the_tip() -> None:
-    """The tip, by the closed form (A2), stays in its box and below its speed, the speed by differences of its place."""
+def test_a_box_for_the_tip() -> None:
+    """The tip, by the closed form (A2), stays in its box."""
     box = (-0.65, 0.65, -0.65, 0.65, 0.2, 1.1)
-    task = _task(replace(Wishes(), harmonics=(20,), tip_speed=1.5, tip_box=box, home=(0.0, 0.6, 0.4)))
+    task = _task(replace(Wishes(), harmonics=(20,), tip_box=box, home=(0.0, 0.6, 0.4)))
     found = design(task, Effort(evaluations=600), 2)
     t = np.arange(0.0, 10.0, GRID)
     place = tip(rrr_geometry(task.robot), found.trajectory.at(t)[0].T)
     for k in range(3):
         assert box[2 * k] <= place[:, k].min()
         assert place[:, k].max() <= box[2 * k + 1]
-    assert np.linalg.norm(np.diff(place, axis=0) / GRID, axis=1).max() <= 1.5
 
 
 def test_a_run_in_keeps_the_limits() -> None:

@@ -34,10 +34,10 @@ BOX = (-2.0, 2.1, -2.2, 2.0, -1.5, 2.5)
 TASKS = {
     "RRR, condition": lambda: _task(rrr(), "condition", rest=False, symmetric=True),
     "RRR, A below a ceiling, from rest at home, torque": lambda: _task(rrr(), "default"),
-    "RRR, tip": lambda: _task(rrr(), "A", tip_speed=40.0, tip_box=BOX, friction=True),
-    "six axes, friction, tip": lambda: _task(six_axes(), "A", rest=False, tip_speed=40.0, tip_box=BOX),
+    "RRR, tip": lambda: _task(rrr(), "A", tip_box=BOX, friction=True),
+    "six axes, friction, tip": lambda: _task(six_axes(), "A", rest=False, tip_box=BOX),
     "six axes, condition": lambda: _task(six_axes(), "condition", speed_share=1.0),
-    "a sliding joint": lambda: _task(sliding(), "A", tip_speed=40.0, tip_box=BOX, rest=False),
+    "a sliding joint": lambda: _task(sliding(), "A", tip_box=BOX, rest=False),
 }
 
 

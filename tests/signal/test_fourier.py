@@ -9,7 +9,6 @@ from pipelines.simulation.fourier_series import (
     FourierSeries,
     adjoint,
     degree_of,
-    good_size,
     periodic_peak,
     synthesise,
 )
@@ -84,15 +83,3 @@ def test_the_degree_of_a_product_is_the_sum() -> None:
     assert degree[0] == 12
     assert 5 < degree[1] < 20
     assert (tail < 1e-8).all()
-
-
-def test_a_good_size_is_the_next_one() -> None:
-    """Against a search through all numbers."""
-    def smooth(n: int) -> bool:
-        for p in (2, 3, 5):
-            while n % p == 0:
-                n //= p
-        return n == 1
-
-    for least in (2, 7, 97, 100, 1001, 7919):
-        assert good_size(least) == next(n for n in range(least, 2 * least) if smooth(n))
