@@ -10,6 +10,7 @@ Source   Kostić et al. 2004, eq. (12)-(15), Table V, Figs. 9, 11, 12
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from pipelines.dynamics.arm import Arm
@@ -31,9 +32,9 @@ from pipelines.estimation.estimate import (
     with_cutoff,
 )
 from pipelines.estimation.identifiability import not_separated
-from pipelines.estimation.judgements import REMEDY, negative_viscous
+from pipelines.estimation.judgements import REMEDY, negative_viscous, unresolved
 from pipelines.estimation.motion import Motions, Reconstruction, for_equations
-from pipelines.estimation.nominal import columns_in_words, fitted_arm, nominal_columns
+from pipelines.estimation.nominal import fitted_arm, nominal_columns
 from pipelines.estimation.periods import averaged, doubts, residuals
 from pipelines.estimation.regression import Columns
 from pipelines.estimation.result import (
@@ -133,7 +134,13 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     recipe = Recipe(how, settings.cutoff_hz, settings.decimate, settings.min_speed, known)
     recipe = with_cutoff(recipe, even[:first])
     means, scatter = averaged(even, recipe.cutoff_hz)
-    columns = _columns(logs[0], settings, friction=given is None, offset=settings.offset)
+    columns_of = partial(
+        nominal_columns,
+        logs[0].robot,
+        rotor_inertia=settings.rotor_inertia,
+        symmetric=settings.symmetric,
+    )
+    columns = columns_of(friction=given is None, offset=settings.offset)
     rows = moving_rows(means, first, columns, recipe, settings.weighted)
 
     def judged_fit(columns: Columns, recipe: Recipe) -> tuple[Fitted, Judged]:
@@ -141,7 +148,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         return fitted, judge(fitted, means[first:], settings.blocks, rows[first:])
 
     fitted, judged = judged_fit(columns, recipe)
-    rigid = _columns(logs[0], settings, friction=False, offset=False)
+    rigid = columns_of(friction=False, offset=False)
     alone = judged_fit(rigid, replace(recipe, known=None))[1]
     arm = fitted_arm(fitted.estimate, logs[0].robot_name, given.friction if given else ())
     for own, log in zip(scatter, logs, strict=True):
@@ -174,13 +181,6 @@ def _chosen(inputs: Inputs, allow_overlap: bool) -> tuple[list[ExperimentLog], l
     return identify, validate
 
 
-def _columns(log: ExperimentLog, settings: Settings, friction: bool, offset: bool) -> Columns:
-    rotor, symmetric = settings.rotor_inertia, settings.symmetric
-    return nominal_columns(
-        log.robot, friction=friction, offset=offset, rotor_inertia=rotor, symmetric=symmetric
-    )
-
-
 def _result(
     fitted: Fitted, judged: Judged, motions: Motions, arm: Arm, settings: Settings
 ) -> Result:
@@ -210,7 +210,7 @@ def _result(
         friction_of=(model or "fit-friction") if given else "",
         physically_consistent=None if checked is None else checked.consistent,
         consistency=checked,
-        unresolved=found.unresolved.told(columns_in_words(names)),
+        unresolved=unresolved(found),
         not_separated=not_separated(found.solution, found.std, names),
         convergence_samples=growth.samples,
         convergence=growth.beta,

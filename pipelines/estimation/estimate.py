@@ -94,9 +94,13 @@ class Estimate:
 
     columns: Columns
     solution: Solution
-    robust: Robust
     statistics: Statistics
     equations: Stacked
+
+    @cached_property
+    def robust(self) -> Robust:
+        """The covariance that allows for a residual with a memory, by two passes."""
+        return robust_covariance(self.equations, self.solution, self.statistics.longest)
 
     @property
     def beta(self) -> Array:
@@ -141,8 +145,7 @@ def estimate(logs: Sequence[LogEquations], columns: Columns, weighted: bool = Tr
     stacked = Stacked(logs)
     weights = None if weighted else np.ones(columns.body.robot.n_joints)
     fitted = fit(stacked, weights=weights)
-    robust = robust_covariance(stacked, fitted.solution, fitted.statistics.longest)
-    return Estimate(columns, fitted.solution, robust, fitted.statistics, stacked)
+    return Estimate(columns, fitted.solution, fitted.statistics, stacked)
 
 
 @dataclass(frozen=True)
@@ -409,14 +412,15 @@ def moving_rows(
     if not any(mask.any() for mask in still[:fitted]) or counts.min() < _CONFIG.fewest_of_joint:
         return rows
     weights = None if weighted else np.ones(len(counts))
-    beta = fit(Stacked(own), weights=weights).solution.beta
-    power, count = np.zeros((2, 2, len(counts)))  # at rest, and in motion
-    for one, every, mask in zip(own, rows, still, strict=False):
-        resting = replace(one, chosen=replace(every, slow=every.slow | ~mask))
-        for k, part in enumerate((resting, one)):
-            for block in part:
-                power[k] += np.sum(block.residual(beta) ** 2, axis=1)
-                count[k] += block.counts
+    in_motion = Stacked(own)
+    beta = fit(in_motion, weights=weights).solution.beta
+    pairs = zip(own, rows, still, strict=False)
+    at_rest = [replace(one, chosen=replace(r, slow=r.slow | ~mask)) for one, r, mask in pairs]
+    power, count = np.zeros((2, 2, len(counts)))
+    for k, part in enumerate((Stacked(at_rest), in_motion)):
+        for block in part:
+            power[k] += np.sum(block.residual(beta) ** 2, axis=1)
+            count[k] += block.counts
     rest, move = np.sqrt(power / np.maximum(count, 1.0))
     stuck = rest > _CONFIG.more * move
     return [

@@ -27,7 +27,6 @@ from pipelines.estimation.nominal import (
     Fit,
     arm_of,
     effect_rows,
-    law_rows,
     law_slopes,
     rigid_rows,
     several_rows,
@@ -308,7 +307,7 @@ def slopes_of(
     by_nominal = nominal_slopes(model)
     if by_nominal is not None:
         return np.concatenate([data.lay_each(by_nominal), further]), names
-    laws = [law_rows(data, law, model.columns) for law in model.columns.laws]
+    laws = [effect_rows(data, law, model.columns.arm) for law in model.columns.laws]
     return np.concatenate([rigid, *laws, further]), names
 
 

@@ -170,11 +170,6 @@ class Refined:
         return np.asarray(self.left * self.weights)
 
     @property
-    def rss(self) -> float:
-        """Squared weighted residual."""
-        return float(self.residual @ self.residual)
-
-    @property
     def rms(self) -> Array:
         """(joints,) [N m]."""
         return self.data.rms(self.left)

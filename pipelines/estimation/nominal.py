@@ -274,7 +274,7 @@ def fit_columns(data: Data, table: Array) -> Fit:
 
 def rows_of(data: Data, columns: Columns) -> Array:
     """(k, rows) of the rigid body and every law."""
-    laws = (law_rows(data, law, columns) for law in columns.laws)
+    laws = (effect_rows(data, law, columns.arm) for law in columns.laws)
     return np.concatenate([rigid_rows(data, columns), *laws])
 
 
@@ -283,11 +283,6 @@ def rigid_rows(data: Data, columns: Columns, times: Array | None = None) -> Arra
     body, kept = columns.body, list(columns.kept)
     key = (body, columns.kept)
     return data.lay_kept(key, lambda m: body.regressor(m.q, m.dq, m.ddq)[:, :, kept], times)
-
-
-def law_rows(data: Data, law: Effect, columns: Columns) -> Array:
-    """(k, rows) of one law."""
-    return effect_rows(data, law, columns.arm)
 
 
 def effect_rows(data: Data, effect: Effect, arm: ArmModel, times: Array | None = None) -> Array:
@@ -316,7 +311,7 @@ def fit_nominal(data: Data, columns: Columns) -> tuple[Columns, Fit]:
     solves for shapes and amplitudes together.
     """
     rigid, laws = rigid_rows(data, columns), list(columns.laws)
-    tables = [law_rows(data, law, columns) for law in laws]
+    tables = [effect_rows(data, law, columns.arm) for law in laws]
     fit = fit_columns(data, np.concatenate([rigid, *tables]))
     for place, law in enumerate(laws):
         if _free(law):
@@ -363,7 +358,7 @@ def law_slopes(
     for place, (law, part) in enumerate(zip(columns.laws, columns.parts, strict=True)):
         for name in _free(law) if beta[part].any() else ():
             moved = (_times(law, name, factor) for factor in (1.0 + _STEP, 1.0 - _STEP))
-            up, down = (law_rows(data, one, columns) for one in moved)
+            up, down = (effect_rows(data, one, columns.arm) for one in moved)
             slopes.append((beta[part] @ (up - down))[None] / (2.0 * _STEP))
             shapes.append((place, name))
     return slopes, shapes
@@ -383,5 +378,5 @@ def _best_of_grid(data: Data, law: Effect, columns: Columns, rest: Fit) -> tuple
 
     grid = law.shapes(data.logs[0].motion, columns.arm)
     shapes = (law, *grid) if plainer(law) else grid
-    laid = [(shape, law_rows(data, shape, columns)) for shape in shapes]
+    laid = [(shape, effect_rows(data, shape, columns.arm)) for shape in shapes]
     return max(laid, key=lambda one: gain(one[1]))
