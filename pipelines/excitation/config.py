@@ -38,12 +38,8 @@ class ExcitationConfig:
     coarse: tuple[Round, ...] = (Round(4, 2e-2, 30), Round(16, 5e-3, 50), Round(64, 2e-3, 60))
     lifted: tuple[Round, ...] = (Round(32, 4e-3, 40), Round(128, 1e-3, 80), Round(400, 3e-4, 120))
     again: tuple[Round, ...] = (Round(32, 2e-3, 40), Round(128, 5e-4, 100), Round(600, 1e-4, 150))
-    final: tuple[Round, ...] = (
-        Round(600, 1e-4, 60),
-        Round(2000, 2e-5, 120),
-        Round(6000, 4e-6, 150),
-        Round(20000, 1e-6, 200),
-    )
+    final: tuple[Round, ...] = (Round(600, 1e-4, 60), Round(2000, 2e-5, 120),
+                                Round(6000, 4e-6, 150), Round(20000, 1e-6, 200))
     starts: int = 8  # on the coarse problem
     lifted_starts: int = 2  # of them, that are refined on the fine one
     pool: int = 5  # points that are disturbed and refined again

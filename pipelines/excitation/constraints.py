@@ -31,14 +31,9 @@ class Limit:
     unit: str
 
 
-def limits_of(
-    robot: RobotDescription,
-    *,
-    torque: bool,
-    torque_share: float = 1.0,
-    speed_share: float = 1.0,
-    tip_box: Array | None = None,
-) -> tuple[Limit, ...]:
+def limits_of(robot: RobotDescription, *, torque: bool, torque_share: float = 1.0,
+              speed_share: float = 1.0,
+              tip_box: Array | None = None) -> tuple[Limit, ...]:
     """Return the limits of a description, in the order in which `signals` of a motion come.
 
     Args:
@@ -47,13 +42,10 @@ def limits_of(
         tip_box: (3, 2) [m] in the base frame.
     """
     found: list[Limit] = []
-    kinds = [
-        ("position", "", 1.0, "rad", "m"),
-        ("speed", "velocity", speed_share, "rad/s", "m/s"),
-        ("acceleration", "acceleration", 1.0, "rad/s^2", "m/s^2"),
-        ("torque", "torque", torque_share, "N m", "N"),
-    ]
-    for name, key, share, turning, sliding in kinds[: 4 if torque else 3]:
+    kinds = [("position", "", 1.0, "rad", "m"), ("speed", "velocity", speed_share, "rad/s", "m/s"),
+             ("acceleration", "acceleration", 1.0, "rad/s^2", "m/s^2"),
+             ("torque", "torque", torque_share, "N m", "N")]
+    for name, key, share, turning, sliding in kinds[:4 if torque else 3]:
         for j, joint in enumerate(robot.joints, 1):
             most = share * getattr(joint, key) if key else 0.0
             low, high = (-most, most) if key else joint.position
@@ -61,10 +53,8 @@ def limits_of(
                 unit = turning if joint.revolute else sliding
                 found.append(Limit(name, j, float(low), float(high), unit))
     if tip_box is not None:
-        found += [
-            Limit(f"tip {axis}", None, float(low), float(high), "m")
-            for axis, (low, high) in zip("xyz", tip_box, strict=True)
-        ]
+        found += [Limit(f"tip {axis}", None, float(low), float(high), "m")
+                  for axis, (low, high) in zip("xyz", tip_box, strict=True)]
     return tuple(found)
 
 

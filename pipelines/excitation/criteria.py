@@ -26,17 +26,8 @@ import numpy.typing as npt
 from pipelines.dynamics.body import Array
 from pipelines.excitation.config import CONFIG
 
-__all__ = [
-    "CRITERIA",
-    "FAR",
-    "Figures",
-    "Goal",
-    "Spectrum",
-    "a_optimal",
-    "condition",
-    "d_optimal",
-    "spectrum",
-]
+__all__ = ["CRITERIA", "FAR", "Figures", "Goal", "Spectrum", "a_optimal", "condition", "d_optimal",
+           "spectrum"]
 
 CRITERIA = ("condition", "D", "A")
 FAR = 1e6  # numerics: added to the logarithm of a condition number above its ceiling
@@ -126,9 +117,8 @@ class Goal:
         bar, on_plain = np.zeros_like(grams), np.zeros_like(plain.vectors)
         if self.criterion in ("D", "A"):
             weighed = self._weighed(grams)
-            value, on_weighed = (
-                d_optimal(weighed) if self.criterion == "D" else a_optimal(weighed, self._weights)
-            )
+            value, on_weighed = (d_optimal(weighed) if self.criterion == "D"
+                                 else a_optimal(weighed, self._weights))
             score = value
             bar[:, self.kept[:, None], self.kept] = on_weighed / self.noise[:, None, None] ** 2
         else:

@@ -46,10 +46,8 @@ class Pair:
 
     @property
     def names(self) -> tuple[str, str]:
-        one, other = (
-            each.name if each.joint is None else f"{each.name}:{each.joint}"
-            for each in (self.first, self.second)
-        )
+        one, other = (each.name if each.joint is None else f"{each.name}:{each.joint}"
+                      for each in (self.first, self.second))
         return one, other
 
 
@@ -82,8 +80,7 @@ class Apart:
         after, before = self.after, self.before
         fine = task.problem.goal.meets(after.condition_number)
         return after.score < before.score and (
-            fine or after.condition_number <= before.condition_number
-        )
+            fine or after.condition_number <= before.condition_number)
 
 
 def refuse_one(pair: Pair, written: Sequence[str]) -> None:
@@ -97,12 +94,9 @@ def refuse_one(pair: Pair, written: Sequence[str]) -> None:
         why = "are not two causes: one is the other with a number given"
         if first == second:
             why = "are one cause"
-        raise UsageError(
-            "C02",
-            f"{' and '.join(written)} {why}; no motion tells a cause from itself",
-            where="--discriminate",
-            remedy="name another cause or joint, or give both another number",
-        )
+        raise UsageError("C02", f"{' and '.join(written)} {why}; no motion tells a cause from "
+                         "itself", where="--discriminate",
+                         remedy="name another cause or joint, or give both another number")
 
 
 def refuse_hidden(task: Task, pair: Pair, seed: int) -> None:
@@ -112,30 +106,20 @@ def refuse_hidden(task: Task, pair: Pair, seed: int) -> None:
         UsageError: C02, no model of the arm predicts its torque, or a cause shows in no motion.
     """
     if task.arm is None:
-        raise UsageError(
-            "C02",
-            "what a cause looks like depends on the torque, and neither a "
-            "model nor the links are known",
-            where="--discriminate",
-            remedy="name a model: --model model.json",
-        )
+        raise UsageError("C02", "what a cause looks like depends on the torque, and neither a "
+                         "model nor the links are known", where="--discriminate",
+                         remedy="name a model: --model model.json")
     problem = landscape(task)
     x = problem.start(np.random.default_rng([seed, 9]))
     seen = alike(task, task.arm, problem.space.motion(x, problem.samples), pair)
-    hidden = [
-        name
-        for name, share in zip(pair.names, seen.identifiability, strict=True)
-        if share < CONFIG.rank
-    ]
+    hidden = [name for name, share in zip(pair.names, seen.identifiability, strict=True)
+              if share < CONFIG.rank]
     if hidden:
         show, them = ("show", "them") if len(hidden) > 1 else ("shows", "it")
-        raise UsageError(
-            "C02",
-            f"{' and '.join(hidden)} {show} in no motion: the base parameters take {them} up",
-            where="--discriminate",
-            remedy="the report of diagnose says what would tell it, under 'What these "
-            "logs cannot tell'",
-        )
+        raise UsageError("C02", f"{' and '.join(hidden)} {show} in no motion: the base parameters "
+                         f"take {them} up", where="--discriminate",
+                         remedy="the report of diagnose says what would tell it, under 'What these "
+                         "logs cannot tell'")
 
 
 def best(task: Task, pair: Pair | None, effort: Effort, seed: int) -> tuple[Design, Apart | None]:
@@ -153,9 +137,8 @@ def best(task: Task, pair: Pair | None, effort: Effort, seed: int) -> tuple[Desi
     return (found, None) if found.stopped else told_apart(task, found, pair, half, seed)
 
 
-def told_apart(
-    task: Task, designed: Design, pair: Pair, effort: Effort, seed: int
-) -> tuple[Design, Apart]:
+def told_apart(task: Task, designed: Design, pair: Pair, effort: Effort,
+               seed: int) -> tuple[Design, Apart]:
     """Change `designed` step by step for the better, its ceiling on the condition number kept.
 
     The finished motion is judged as it is; where it gained nothing, the plain design is returned.
@@ -170,9 +153,8 @@ def told_apart(
     until = time.process_time() + effort.seconds
     stopped = designed.stopped
     try:
-        while (
-            time.process_time() < until if effort.evaluations is None else done < effort.evaluations
-        ):
+        while (time.process_time() < until if effort.evaluations is None
+               else done < effort.evaluations):
             done += 1
             other = problem.disturbed(x, size, rng)
             seen = alike(task, task.arm, problem.space.motion(other, problem.samples), pair)
@@ -202,15 +184,12 @@ def alike(task: Task, arm: Arm, motion: Array, pair: Pair) -> Alike:
     weight = 1.0 / np.asarray(goal.noise)[:, None]
     basis = _orthonormal(_nominal(task, motion, rows) * weight)
     step = task.harmonics.period / motion.shape[2]
-    seen = Motion(
-        step * np.arange(motion.shape[2]), *(np.ascontiguousarray(part.T) for part in motion)
-    )
+    seen = Motion(step * np.arange(motion.shape[2]),
+                  *(np.ascontiguousarray(part.T) for part in motion))
     tables = []
     for effect, start in zip((pair.first, pair.second), pair.starts, strict=True):
-        parts = [
-            _beyond(one.columns(seen, arm).transpose(2, 1, 0) * weight, basis)
-            for one in _shapes(effect, start, seen, arm)
-        ]
+        parts = [_beyond(one.columns(seen, arm).transpose(2, 1, 0) * weight, basis)
+                 for one in _shapes(effect, start, seen, arm)]
         tables.append([part for part in parts if part[1] >= CONFIG.rank] or parts)
     most = max(min(_imitated(a, b), _imitated(b, a)) for a, _ in tables[0] for b, _ in tables[1])
     first, second = (min(share for _, share in table) for table in tables)

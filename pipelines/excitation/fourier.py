@@ -41,42 +41,33 @@ class Harmonics:
         return Harmonics(self.period, used) if used.sum(axis=1).min() > 1 else self
 
 
-def plan_harmonics(
-    frequency: float, count: Sequence[int], stop_band: Sequence[float] = ()
-) -> Harmonics:
+def plan_harmonics(frequency: float, count: Sequence[int],
+                   stop_band: Sequence[float] = ()) -> Harmonics:
     """Return `count` harmonics of `frequency` [Hz], one a joint, outside of bands from, to [Hz].
 
     Raises:
         UsageError: C02, too many harmonics, or none outside the bands.
     """
     if not 0.0 < frequency < math.inf or not 1 <= min(count) <= max(count) <= CONFIG.most_harmonics:
-        raise UsageError(
-            "C02",
-            f"{max(count)} harmonics of {frequency:g} Hz",
-            where="--frequency, --harmonics",
-            remedy="give for example --frequency "
-            f"0.1 --harmonics 100; {CONFIG.most_harmonics} harmonics at most",
-        )
+        raise UsageError("C02", f"{max(count)} harmonics of {frequency:g} Hz",
+                         where="--frequency, --harmonics", remedy="give for example --frequency "
+                         f"0.1 --harmonics 100; {CONFIG.most_harmonics} harmonics at most")
     number = np.arange(1, max(count) + 1)
     used = number <= np.array(count)[:, None]
     for low, high in zip(stop_band[::2], stop_band[1::2], strict=True):
         used[:, (frequency * number >= low) & (frequency * number <= high)] = False
     if used.sum(axis=1).min() < CONFIG.fewest_harmonics:
-        raise UsageError(
-            "C02",
-            "a joint has fewer than two harmonics",
-            where="--harmonics, --stop-band",
-            remedy="give more harmonics, and narrow bands to stay out of",
-        )
+        raise UsageError("C02", "a joint has fewer than two harmonics",
+                         where="--harmonics, --stop-band",
+                         remedy="give more harmonics, and narrow bands to stay out of")
     return Harmonics(1.0 / frequency, used)
 
 
 class MotionSpace:
     """Motions as vectors x (joints * (1 + 2 harmonics),)."""
 
-    def __init__(
-        self, harmonics: Harmonics, speed: Array, *, rest: bool, home: Array | None
-    ) -> None:
+    def __init__(self, harmonics: Harmonics, speed: Array, *, rest: bool,
+                 home: Array | None) -> None:
         """Scale by `speed` [rad/s] (joints,); start at `home` [rad] (joints,), or anywhere."""
         self.harmonics, self.home = harmonics, home
         n, top = harmonics.used.shape
@@ -109,16 +100,15 @@ class MotionSpace:
 
     def series(self, x: Array) -> fourier.FourierSeries:
         rows, top = x.reshape(self.joints, self.width) * self.scale, (self.width + 1) // 2
-        return fourier.FourierSeries(
-            self.harmonics.period, rows[:, 0], rows[:, 1:top], rows[:, top:]
-        )
+        return fourier.FourierSeries(self.harmonics.period, rows[:, 0], rows[:, 1:top],
+                                     rows[:, top:])
 
     def point(self, series: fourier.FourierSeries) -> Array:
         """Return x of a series of as many harmonics or fewer, projected."""
         rows, top = np.zeros((self.joints, self.width)), (self.width + 1) // 2
         rows[:, 0] = series.offset
-        rows[:, 1 : 1 + series.harmonics] = series.cosine
-        rows[:, top : top + series.harmonics] = series.sine
+        rows[:, 1:1 + series.harmonics] = series.cosine
+        rows[:, top:top + series.harmonics] = series.sine
         unit = np.divide(rows, self.scale, out=np.zeros_like(rows), where=self.scale > 0.0)
         return self.project(unit)
 

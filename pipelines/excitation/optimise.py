@@ -86,9 +86,8 @@ class _Search:
         self.x: Array | None = None
         self._begun, self._last = time.process_time(), 0.0
 
-    def descend(
-        self, land: DesignProblem, x: Array, rounds: Sequence[Round], best: bool
-    ) -> tuple[float, Array]:
+    def descend(self, land: DesignProblem, x: Array, rounds: Sequence[Round],
+                best: bool) -> tuple[float, Array]:
         """Refine x; return the best exact figure on the way and its point; `best`: it may be the
         answer."""
         from scipy.optimize import minimize
@@ -110,19 +109,9 @@ class _Search:
             return value, gradient
 
         for one in rounds:
-            x = minimize(
-                function,
-                x,
-                args=(one,),
-                jac=True,
-                method="L-BFGS-B",
-                options={
-                    "maxiter": one.iterations,
-                    "maxcor": PAIRS,
-                    "gtol": 0.0,
-                    "ftol": FINE if best else ROUGH,
-                },
-            ).x
+            x = minimize(function, x, args=(one,), jac=True, method="L-BFGS-B", options={
+                "maxiter": one.iterations, "maxcor": PAIRS, "gtol": 0.0,
+                "ftol": FINE if best else ROUGH}).x
         return own
 
     @property
@@ -153,10 +142,8 @@ class _Search:
             number = np.exp(self.score - FAR)
             return f"evaluation {self.done}: condition number {number:.3f} so far"
         name = "number" if goal.criterion == "condition" else "criterion"
-        return (
-            f"evaluation {self.done}: best {goal.criterion} {name} {self.score:.4f}, found at "
-            f"{self.found_at}"
-        )
+        return (f"evaluation {self.done}: best {goal.criterion} {name} {self.score:.4f}, found at "
+                f"{self.found_at}")
 
     def run(self, coarse: DesignProblem, fine: DesignProblem, rng: np.random.Generator) -> None:
         """Search until the budget is spent."""
@@ -170,12 +157,10 @@ class _Search:
                 self.descend(fine, lifted, glance, best=True)  # an early end has something to keep
                 starts.append((score, lifted))
             starts.sort(key=lambda start: start[0])
-            pool += [
-                self.descend(fine, x, CONFIG.lifted, best=True)
-                for _, x in starts[: CONFIG.lifted_starts]
-            ]
+            pool += [self.descend(fine, x, CONFIG.lifted, best=True)
+                     for _, x in starts[:CONFIG.lifted_starts]]
             for place, size in CONFIG.turns:
-                pool = sorted(pool, key=lambda member: member[0])[: CONFIG.pool]
+                pool = sorted(pool, key=lambda member: member[0])[:CONFIG.pool]
                 place = min(place, len(pool) - 1)
                 x = fine.disturbed(pool[place][1], size, rng)
                 found = self.descend(fine, x, CONFIG.again, best=True)
@@ -238,12 +223,9 @@ def _refuse_impossible(task: Task, fine: DesignProblem, rng: np.random.Generator
         place = f"the {limit.quantity} limit of joint {limit.joint}"
     home = "" if task.home is None else f" at home ({', '.join(f'{q:.4g}' for q in task.home)})"
     raise UsageError(
-        "C08",
-        f"no motion keeps {place}, {limit.low:.4g} to {limit.high:.4g} {limit.unit}: at a "
-        f"standstill{home} it is exceeded already",
-        where="limits",
-        remedy="start elsewhere (--home), or correct that limit",
-    )
+        "C08", f"no motion keeps {place}, {limit.low:.4g} to {limit.high:.4g} {limit.unit}: at a "
+        f"standstill{home} it is exceeded already", where="limits",
+        remedy="start elsewhere (--home), or correct that limit")
 
 
 def _smaller(task: Task, final: DesignProblem, x: Array) -> tuple[Array, float]:
@@ -267,10 +249,8 @@ def _peaks(task: Task, trajectory: Trajectory) -> tuple[Peak, ...]:
     found = [task.peaks(series.samples(count), periodic=True)]
     if trajectory.run_in > 0.0:
         t = CONFIG.grid * np.arange(round(trajectory.run_in / CONFIG.grid) + 1, dtype=np.float64)
-        found += [
-            task.peaks(trajectory.at(at), periodic=False)
-            for at in (t, trajectory.duration - t[::-1])
-        ]
+        found += [task.peaks(trajectory.at(at), periodic=False)
+                  for at in (t, trajectory.duration - t[::-1])]
     return tuple(max(group, key=lambda peak: peak.share) for group in zip(*found, strict=True))
 
 
@@ -294,9 +274,5 @@ def _with_run_in(task: Task, trajectory: Trajectory) -> Trajectory:
         duration *= longer
     of = f" of joint {nearest.joint}" if nearest is not None and nearest.joint else ""
     quantity = "" if nearest is None else nearest.quantity
-    raise UsageError(
-        "C08",
-        f"no run-in of up to {longest:g} s keeps the {quantity} limit{of}",
-        where="--no-rest",
-        remedy="start at rest, or from another home",
-    )
+    raise UsageError("C08", f"no run-in of up to {longest:g} s keeps the {quantity} limit{of}",
+                     where="--no-rest", remedy="start at rest, or from another home")

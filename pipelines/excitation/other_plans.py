@@ -86,12 +86,9 @@ def _within(task: Task, make: Callable[[float], tuple[Plan, ...]]) -> tuple[Plan
             found = broken.nearest
             of = "" if found.joint is None else f" of joint {found.joint}"
             raise UsageError(
-                "C08",
-                f"{broken.name} cannot keep the {found.quantity} limit{of}, "
-                f"{found.limit:.4g} {found.unit}",
-                where="limits",
-                remedy="start elsewhere (--home), or correct that limit",
-            )
+                "C08", f"{broken.name} cannot keep the {found.quantity} limit{of}, "
+                f"{found.limit:.4g} {found.unit}", where="limits",
+                remedy="start elsewhere (--home), or correct that limit")
         share *= CONFIG.slower
 
 
@@ -102,29 +99,16 @@ def _nearest(task: Task, plan: Plan) -> Peak | None:
         excited = plan.motion.copy()
         excited[2] += plan.v.T
         tau = np.abs(torque_of(task.arm, excited)).max(axis=1)
-        found += [
-            Peak(
-                one.joint,
-                "torque",
-                float(tau[one.joint - 1]),
-                one.high,
-                one.unit,
-                float(tau[one.joint - 1]) / one.high,
-            )
-            for one in task.problem.limits
-            if one.quantity == "torque" and one.joint
-        ]
+        found += [Peak(one.joint, "torque", float(tau[one.joint - 1]), one.high, one.unit,
+                       float(tau[one.joint - 1]) / one.high)
+                  for one in task.problem.limits if one.quantity == "torque" and one.joint]
     return worst(found)
 
 
 def _home(task: Task) -> Array:
     if task.home is None:
-        raise UsageError(
-            "C02",
-            "these experiments need a posture where the other joints stay",
-            where="--no-rest",
-            remedy="leave --no-rest out, or give --home",
-        )
+        raise UsageError("C02", "these experiments need a posture where the other joints stay",
+                         where="--no-rest", remedy="leave --no-rest out, or give --home")
     return task.home
 
 
@@ -151,12 +135,8 @@ def _friction(task: Task, j: int, home: Array, share: float) -> tuple[Plan, ...]
             _stroke(knots, speed, ramp, hold)
             held.append(speed)
     if not held:
-        raise UsageError(
-            "C08",
-            f"joint {j + 1} has too small a range to hold any speed",
-            where="position limits",
-            remedy="widen them, or record friction by hand",
-        )
+        raise UsageError("C08", f"joint {j + 1} has too small a range to hold any speed",
+                         where="position limits", remedy="widen them, or record friction by hand")
     _move(knots, float(home[j]), rate, top)
     t, motion = _sampled(task, j, home, knots)
     words = f"{len(held)} speeds from {held[0]:.3g} to {held[-1]:.3g} rad/s, each both ways"
@@ -229,34 +209,21 @@ def _frf(task: Task, j: int, home: Array, seed: int, share: float) -> tuple[Plan
     seconds, (low, high) = CONFIG.frf_period, CONFIG.frf_band
     period, found = round(seconds / task.sample_time), []
     lines = np.arange(int(low * seconds) | 1, int(high * period) + 1, 2)
-    words = (
-        f"{len(lines)} odd lines from {lines[0] / seconds:.3g} to "
-        f"{lines[-1] / seconds:.4g} Hz, repeated every {seconds:g} s"
-    )
+    words = (f"{len(lines)} odd lines from {lines[0] / seconds:.3g} to "
+             f"{lines[-1] / seconds:.4g} Hz, repeated every {seconds:g} s")
     for k in range(CONFIG.realisations):
         own = realisation(np.random.default_rng([seed, j, k]), lines, period, len(t))
         v = np.zeros((len(t), task.robot.n_joints))
         v[:, j] = share * strength * own
-        found.append(
-            Plan(
-                f"frf-{j + 1}-{k + 1}",
-                "frf",
-                j + 1,
-                home,
-                t,
-                motion,
-                v,
-                period * task.sample_time,
-                f"{speed:.3g} rad/s there and back, {hold:.3g} s each way, {words}; {k + 1} of "
-                f"{CONFIG.realisations}",
-            )
-        )
+        found.append(Plan(
+            f"frf-{j + 1}-{k + 1}", "frf", j + 1, home, t, motion, v, period * task.sample_time,
+            f"{speed:.3g} rad/s there and back, {hold:.3g} s each way, {words}; {k + 1} of "
+            f"{CONFIG.realisations}"))
     return tuple(found)
 
 
-def realisation(
-    rng: np.random.Generator, lines: npt.NDArray[np.int64], period: int, samples: int
-) -> Array:
+def realisation(rng: np.random.Generator, lines: npt.NDArray[np.int64],
+                period: int, samples: int) -> Array:
     """Return lines of equal amplitude and random phase, rms 1, repeated after `period` samples."""
     spectrum = np.zeros(period // 2 + 1, dtype=np.complex128)
     spectrum[lines] = np.exp(2j * np.pi * rng.uniform(size=len(lines)))

@@ -41,20 +41,15 @@ class ArmProblem:
     @cached_property
     def limited(self) -> tuple[Array, ...]:
         """Joints with a limit of position, speed, acceleration and torque."""
-        return tuple(
-            np.array(
-                [one.joint - 1 for one in self.limits if one.quantity == name and one.joint],
-                dtype=np.intp,
-            )
-            for name in ("position", "speed", "acceleration", "torque")
-        )
+        return tuple(np.array([one.joint - 1 for one in self.limits
+                               if one.quantity == name and one.joint], dtype=np.intp)
+                     for name in ("position", "speed", "acceleration", "torque"))
 
     def torque(self, rows: Sequence[Array], dq: Array) -> Array:
         """Return τ (joints, samples) of the model."""
         assert self.beta is not None
-        tau = np.stack(
-            [self.beta[own] @ row for own, row in zip(self.columns.columns, rows, strict=True)]
-        )
+        tau = np.stack([self.beta[own] @ row
+                        for own, row in zip(self.columns.columns, rows, strict=True)])
         if self.drag is None:
             return tau
         return tau + self.drag[:, :1] * np.tanh(CONFIG.sharpness * dq) + self.drag[:, 1:] * dq
@@ -79,7 +74,7 @@ class ArmProblem:
         out, on_torque = np.zeros_like(motion), np.zeros_like(motion[0])
         first = 0
         for target, own in zip((*out, on_torque), self.limited, strict=True):
-            target[own] += bars[first : first + len(own)]
+            target[own] += bars[first:first + len(own)]
             first += len(own)
         if self.drag is not None:
             level = np.tanh(CONFIG.sharpness * motion[1])
@@ -97,14 +92,8 @@ class ArmProblem:
 class DesignProblem:
     """The problem on one space of motions, sampled `samples` times a period."""
 
-    def __init__(
-        self,
-        arm: ArmProblem,
-        space: MotionSpace,
-        samples: int,
-        around: tuple[Array, Array],
-        room: float = 1.0,
-    ) -> None:
+    def __init__(self, arm: ArmProblem, space: MotionSpace, samples: int,
+                 around: tuple[Array, Array], room: float = 1.0) -> None:
         """Centre random motions between the postures `around`, within `room` of the limits."""
         self.arm, self.space, self.samples, self.around = arm, space, samples, around
         self.middle, half = middle_and_half(arm.limits)
@@ -120,10 +109,8 @@ class DesignProblem:
         wall, on_signals, inside = barrier(signals, self.middle, self.half)
         grams = grams_of_rows(arm.columns, rows)
         value, on_grams, score = arm.goal.value(grams, sharpness)
-        bars = [
-            (2.0 / self.samples) * (on_grams[j][np.ix_(own, own)] @ row)
-            for j, (own, row) in enumerate(zip(arm.columns.columns, rows, strict=True))
-        ]
+        bars = [(2.0 / self.samples) * (on_grams[j][np.ix_(own, own)] @ row)
+                for j, (own, row) in enumerate(zip(arm.columns.columns, rows, strict=True))]
         gradient = self.space.gradient(arm.adjoint(motion, weight * on_signals, bars))
         return value + weight * wall, gradient, score if inside else np.inf
 

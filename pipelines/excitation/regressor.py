@@ -78,42 +78,23 @@ class RRRRows:
         by_u, by_vv = w[7] * cS + w[8] * sS, w[8] * cS - w[7] * sS
         by_u2, by_v22 = w[9] * c2 + w[10] * s2, w[10] * c2 - w[9] * s2
         mixed = v12 * (w3 * sin223 - w2 * cos223)  # of 2 q2 + q3
-        by_q2 = (
-            u1 * (w[1] * cos22 - w[0] * sin22)
-            - 2 * v12 * (w[0] * cos22 + w[1] * sin22)
-            - s2 * (u1 * up - v13 * down)
-            + mixed
-            + u2 * by_v22
-            - v22 * by_u2
-        )
-        by_S = (
-            mixed
-            - c2 * (u1 * down + v13 * up)
-            - u1 * (w[4] * sin2S + w[5] * cos2S)
-            + 2 * v1v * (w[5] * sin2S - w[4] * cos2S)
-            + u * by_vv
-            - vv * by_u
-        )
+        by_q2 = (u1 * (w[1] * cos22 - w[0] * sin22) - 2 * v12 * (w[0] * cos22 + w[1] * sin22)
+                 - s2 * (u1 * up - v13 * down) + mixed + u2 * by_v22 - v22 * by_u2)
+        by_S = (mixed - c2 * (u1 * down + v13 * up) - u1 * (w[4] * sin2S + w[5] * cos2S)
+                + 2 * v1v * (w[5] * sin2S - w[4] * cos2S) + u * by_vv - vv * by_u)
         out[0, 1] += by_q2 + by_S
         out[0, 2] += by_S
         out[1, 0] += k12 * v2 + k13 * v3 + k1v * v
         turn = k1v * v1 + 2 * v * by_vv
         out[1, 1] += k12 * v1 + turn + 2 * v2 * by_v22
         out[1, 2] += k13 * v1 + turn
-        out[2, 0] += (
-            w[0] * (c2 * c2)
-            + 0.5 * w[1] * sin22
-            + c2 * up
-            + w[4] * (cS * cS)
-            - 0.5 * w[5] * sin2S
-            + w[6]
-        )
+        out[2, 0] += (w[0] * (c2 * c2) + 0.5 * w[1] * sin22 + c2 * up + w[4] * (cS * cS)
+                      - 0.5 * w[5] * sin2S + w[6])
         out[2, 1] += by_u + by_u2
         out[2, 2] += by_u
 
-    def _other_rows(
-        self, two: Array, three: Array, angles: tuple[Array, ...], motion: Array, out: Array
-    ) -> None:
+    def _other_rows(self, two: Array, three: Array, angles: tuple[Array, ...], motion: Array,
+                    out: Array) -> None:
         """Add rows two and three; columns 5, 6, 8 and 9, which they share, have both bars."""
         c2, s2, c3, s3, cS, sS = angles
         (v1, v2, v3), (u1, u2, u3) = motion[1], motion[2]
@@ -128,23 +109,14 @@ class RRRRows:
         x2, x3 = t2 + r2, t3 + r3
         by_fore, by_bent = r2 * s3 + r3 * c3, r2 * c3 - r3 * s3
         by_turning, by_slanted = -t2 * s3 - t3 * c3, t2 * c3 - t3 * s3
-        by_half = (
-            t0 * sin22 - t1 * cos22 + x2 * sin223 + x3 * cos223 + t4 * sin2S + t5 * cos2S + by_fore
-        )
+        by_half = (t0 * sin22 - t1 * cos22 + x2 * sin223 + x3 * cos223 + t4 * sin2S + t5 * cos2S
+                   + by_fore)
         mixed = half * (x2 * cos223 - x3 * sin223)
         by_q3 = slanted * by_turning - turning * by_slanted + fore * by_bent - u2 * by_fore
-        by_q2 = (
-            2 * half * (t0 * cos22 + t1 * sin22)
-            + mixed
-            + u1 * (t10 * c2 - t9 * s2)
-            - g * (t13 * s2 + t14 * c2)
-        )
-        by_S = (
-            mixed
-            + 2 * half * (t4 * cos2S - t5 * sin2S)
-            + u1 * (t8 * cS - t7 * sS)
-            - g * ((two[2] + three[4]) * sS + (two[3] + three[5]) * cS)
-        )
+        by_q2 = (2 * half * (t0 * cos22 + t1 * sin22) + mixed + u1 * (t10 * c2 - t9 * s2)
+                 - g * (t13 * s2 + t14 * c2))
+        by_S = (mixed + 2 * half * (t4 * cos2S - t5 * sin2S) + u1 * (t8 * cS - t7 * sS)
+                - g * ((two[2] + three[4]) * sS + (two[3] + three[5]) * cS))
         out[0, 1] += by_q2 + by_S
         out[0, 2] += by_S + by_q3
         out[1, 0] += v1 * by_half
@@ -186,7 +158,7 @@ class ChainRows:
             for j in range(i + 1):
                 np.einsum("rs,rcs->cs", state[:, 2 + j], wrench, out=y[j, own])
             self._links.append((turned, state, wrench))
-        return tuple(y[j, self._first[j] :] for j in range(n))
+        return tuple(y[j, self._first[j]:] for j in range(n))
 
     def adjoint(self, motion: Array, bars: Sequence[Array]) -> Array:
         """Return the derivatives by the motion from those by each row, after its `rows`."""
@@ -195,13 +167,13 @@ class ChainRows:
         bar = np.zeros((6, 2 + n, motion.shape[2]))  # by A, V and all twists
         for i in reversed(range(n)):
             turned, state, wrench = self._links[i]
-            own = np.stack([bars[j][at[i] - at[j] : at[i + 1] - at[j]] for j in range(i + 1)])
+            own = np.stack([bars[j][at[i] - at[j]:at[i + 1] - at[j]] for j in range(i + 1)])
             if self.chosen[i]:
-                bar[:, 2 : 3 + i] += np.einsum("jcs,rcs->rjs", own, wrench)
+                bar[:, 2:3 + i] += np.einsum("jcs,rcs->rjs", own, wrench)
                 on_wrench = np.einsum("jcs,rjs->rcs", own, state[:, 2:])
                 _wrench_adjoint(state[:, 0], state[:, 1], self.chosen[i], on_wrench, bar)
             bar = _through(chain.after[i], bar, back=True)
-            bar = bar[:, : 2 + i]  # the joint's own twist is constant
+            bar = bar[:, :2 + i]  # the joint's own twist is constant
             _drive_adjoint(turned, bar, self._moves[i].revolute, motion[1, i], out[:, i])
             out[0, i] += _turn_adjoint(self._moves[i], turned, bar)
             bar = _through(chain.before[i], bar, back=True)
@@ -282,9 +254,8 @@ def _wrenches(spatial: Array, velocity: Array, chosen: list[int]) -> Array:
     return wrench
 
 
-def _wrench_adjoint(
-    spatial: Array, velocity: Array, chosen: list[int], on: Array, bar: Array
-) -> None:
+def _wrench_adjoint(spatial: Array, velocity: Array, chosen: list[int], on: Array,
+                    bar: Array) -> None:
     """Add to `bar` the derivatives by A and V, from those by the wrenches (6, chosen, samples)."""
     omega, v = velocity[:3], velocity[3:]
     by_a, by_alpha, by_omega = np.zeros_like(omega), bar[:3, 0], np.zeros_like(omega)
@@ -329,8 +300,7 @@ class ArmColumns:
             return rigid
         return tuple(
             np.concatenate([own, np.stack([np.tanh(CONFIG.sharpness * v), v, np.ones_like(v)])])
-            for own, v in zip(rigid, motion[1], strict=True)
-        )
+            for own, v in zip(rigid, motion[1], strict=True))
 
     def adjoint(self, motion: Array, bars: Sequence[Array]) -> Array:
         """Return the derivatives by the motion from those by each row, after its `rows`."""
@@ -352,9 +322,8 @@ def arm_columns(body: RigidBody, *, friction: bool) -> ArmColumns:
     names, units = [p.name for p in body.parameters], [p.unit for p in body.parameters]
     columns, count = rigid.columns, len(names)
     if friction:
-        columns = tuple(
-            np.concatenate([own, count + 3 * j + np.arange(3)]) for j, own in enumerate(columns)
-        )
+        columns = tuple(np.concatenate([own, count + 3 * j + np.arange(3)])
+                        for j, own in enumerate(columns))
         for j, revolute in enumerate(body.robot.revolute, 1):
             torque, damping = ("N m", "N m s/rad") if revolute else ("N", "N s/m")
             names += [f"coulomb:{j}", f"viscous:{j}", f"torque_offset:{j}"]

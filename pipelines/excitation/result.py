@@ -24,19 +24,8 @@ from pipelines.io.log import ExperimentLog, Signal
 from pipelines.io.results import NOT_STORED
 from pipelines.writing.task import planned_log
 
-__all__ = [
-    "Course",
-    "DrawnPlan",
-    "ParameterStd",
-    "Result",
-    "coefficients",
-    "doubts",
-    "gentle_log",
-    "information_of",
-    "judged",
-    "log_of",
-    "planned",
-]
+__all__ = ["Course", "DrawnPlan", "ParameterStd", "Result", "coefficients", "doubts",
+           "gentle_log", "information_of", "judged", "log_of", "planned"]
 
 BLOCK = 4096  # numerics: samples whose rows are computed at once
 
@@ -123,15 +112,9 @@ class Result:
 
 
 def _of_task(task: Task, purpose: str, seed: int) -> Result:
-    return Result(
-        task.robot.name,
-        tuple(joint.name for joint in task.robot.joints),
-        purpose,
-        seed,
-        task.sample_time,
-        torque_checked=task.arm is not None,
-        home=None if task.home is None else tuple(map(float, task.home)),
-    )
+    return Result(task.robot.name, tuple(joint.name for joint in task.robot.joints), purpose, seed,
+                  task.sample_time, torque_checked=task.arm is not None,
+                  home=None if task.home is None else tuple(map(float, task.home)))
 
 
 def planned(task: Task, purpose: str, seed: int, plans: Sequence[Plan]) -> Result:
@@ -140,39 +123,18 @@ def planned(task: Task, purpose: str, seed: int, plans: Sequence[Plan]) -> Resul
     for plan in plans:
         rows = slice(None, None, max(1, len(plan.t) // CONFIG.points))
         speed, acceleration = (float(np.abs(part).max()) for part in plan.motion[1:])
-        drawn.append(
-            DrawnPlan(
-                plan.name,
-                plan.joint,
-                plan.words,
-                float(plan.t[-1]),
-                plan.t[rows],
-                plan.motion[0].T[rows],
-                speed,
-                acceleration,
-                plan.nearest,
-            )
-        )
+        drawn.append(DrawnPlan(plan.name, plan.joint, plan.words, float(plan.t[-1]), plan.t[rows],
+                               plan.motion[0].T[rows], speed, acceleration, plan.nearest))
     logs = []
     for plan in plans:
         log = log_of(task, plan.name, plan.t, plan.motion, plan.experiment)
         signals = dict(log.signals)
         if plan.v is not None:
             signals["v"] = Signal(plan.v, "rad/s^2", "injected excitation")
-        logs.append(
-            (
-                plan.name,
-                replace(
-                    log, signals=signals, joint=plan.joint, posture=plan.posture, period=plan.period
-                ),
-            )
-        )
-    return replace(
-        _of_task(task, purpose, seed),
-        plans=tuple(drawn),
-        logs=tuple(logs),
-        duration=sum(plan.seconds for plan in drawn),
-    )
+        logs.append((plan.name, replace(log, signals=signals, joint=plan.joint,
+                                        posture=plan.posture, period=plan.period)))
+    return replace(_of_task(task, purpose, seed), plans=tuple(drawn), logs=tuple(logs),
+                   duration=sum(plan.seconds for plan in drawn))
 
 
 def judged(task: Task, design: Design, apart: Apart | None, seed: int) -> Result:
@@ -185,15 +147,9 @@ def judged(task: Task, design: Design, apart: Apart | None, seed: int) -> Result
     grams = grams_of(columns, motion)
     figures, std = goal.figures(grams), goal.std(grams)
     parameters = tuple(
-        ParameterStd(
-            columns.names[k],
-            columns.units[k],
-            None if problem.beta is None else float(problem.beta[k]),
-            float(std[k]),
-            bool(k < columns.rigid_count),
-        )
-        for k in goal.kept.tolist()
-    )
+        ParameterStd(columns.names[k], columns.units[k],
+                     None if problem.beta is None else float(problem.beta[k]), float(std[k]),
+                     bool(k < columns.rigid_count)) for k in goal.kept.tolist())
     rows = slice(None, None, max(1, samples // CONFIG.points))
     q, dq, ddq = (part.T[rows] for part in motion)
     t = np.arange(samples, dtype=np.float64)[rows] * (series.period / samples)
@@ -201,29 +157,16 @@ def judged(task: Task, design: Design, apart: Apart | None, seed: int) -> Result
     bounded = rrr.fits(task.robot) and goal.earlier is None
     used = np.flatnonzero(task.harmonics.used.any(axis=0))
     return replace(
-        _of_task(task, "excitation", seed),
-        **vars(figures),
-        limits=design.peaks,
-        ceiling=goal.ceiling,
-        lower_bound=LOWER_BOUND if bounded else None,
-        evaluations=design.evaluations,
-        found_at=design.found_at,
-        interrupted=design.stopped > 0,
-        stopped=design.stopped,
-        reached=goal.meets(figures.condition_number),
-        shrunk=design.shrunk,
-        parameters=parameters,
+        _of_task(task, "excitation", seed), **vars(figures), limits=design.peaks,
+        ceiling=goal.ceiling, lower_bound=LOWER_BOUND if bounded else None,
+        evaluations=design.evaluations, found_at=design.found_at, interrupted=design.stopped > 0,
+        stopped=design.stopped, reached=goal.meets(figures.condition_number),
+        shrunk=design.shrunk, parameters=parameters,
         course=Course(t, q, dq, ddq, tau),
-        period=series.period,
-        periods=trajectory.periods,
-        run_in=trajectory.run_in,
-        duration=trajectory.duration,
-        noise=tuple(map(float, goal.noise)),
-        top_hz=float(used[-1] + 1) / series.period,
-        apart=apart,
-        turning=_turning(task, trajectory),
-        coefficients=coefficients(task, trajectory),
-    )
+        period=series.period, periods=trajectory.periods, run_in=trajectory.run_in,
+        duration=trajectory.duration, noise=tuple(map(float, goal.noise)),
+        top_hz=float(used[-1] + 1) / series.period, apart=apart, turning=_turning(task, trajectory),
+        coefficients=coefficients(task, trajectory))
 
 
 def _turning(task: Task, trajectory: Trajectory) -> tuple[int, ...]:
@@ -258,9 +201,8 @@ def gentle_log(task: Task, trajectory: Trajectory, share: float) -> ExperimentLo
 def log_of(task: Task, name: str, t: Array, motion: Array, experiment: str) -> ExperimentLog:
     """Return the planned log of a motion (3, joints, samples) at times t (samples,) [s]."""
     q, dq, ddq = (np.ascontiguousarray(part.T) for part in motion)
-    return planned_log(
-        f"{task.robot.name} {name}", task.robot, Motion(t, q, dq, ddq), experiment, "identify"
-    )
+    return planned_log(f"{task.robot.name} {name}", task.robot, Motion(t, q, dq, ddq), experiment,
+                       "identify")
 
 
 def coefficients(task: Task, trajectory: Trajectory) -> dict[str, object]:
@@ -268,25 +210,13 @@ def coefficients(task: Task, trajectory: Trajectory) -> dict[str, object]:
     series, joints = trajectory.series, []
     for j, joint in enumerate(task.robot.joints):
         own = np.flatnonzero(task.harmonics.used[j])
-        joints.append(
-            {
-                "joint": j + 1,
-                "name": joint.name,
-                "q0": float(series.offset[j]),
-                "harmonics": (own + 1).tolist(),
-                "a": series.cosine[j, own].tolist(),
-                "b": series.sine[j, own].tolist(),
-            }
-        )
+        joints.append({"joint": j + 1, "name": joint.name, "q0": float(series.offset[j]),
+                       "harmonics": (own + 1).tolist(), "a": series.cosine[j, own].tolist(),
+                       "b": series.sine[j, own].tolist()})
     formula = "q = q0 + sum_j (a_j sin(w_j t) - b_j cos(w_j t))/w_j, w_j = 2 pi j / period"
-    return {
-        "formula": formula,
-        "period": series.period,
-        "run_in": trajectory.run_in,
-        "units": {"period": "s", "q0": "rad", "a": "rad/s", "b": "rad/s"},
-        "periods": trajectory.periods,
-        "joints": joints,
-    }
+    return {"formula": formula, "period": series.period, "run_in": trajectory.run_in,
+            "units": {"period": "s", "q0": "rad", "a": "rad/s", "b": "rad/s"},
+            "periods": trajectory.periods, "joints": joints}
 
 
 def information_of(logs: Iterable[ExperimentLog], columns: ArmColumns) -> Array:
@@ -297,6 +227,6 @@ def information_of(logs: Iterable[ExperimentLog], columns: ArmColumns) -> Array:
         motion = reconstruct(log, Reconstruction()).motion
         whole = np.stack([motion.q.T, motion.dq.T, motion.ddq.T])
         for first in range(0, whole.shape[2], BLOCK):
-            block = np.ascontiguousarray(whole[:, :, first : first + BLOCK])
+            block = np.ascontiguousarray(whole[:, :, first:first + BLOCK])
             total += grams_of(columns, block) * block.shape[2]
     return total

@@ -1,6 +1,6 @@
 """Decide everything that a request for a design leaves open.
 
-task = plan_task(robot, arm, wishes)       refuses what cannot be designed, and says why
+    task = plan_task(robot, arm, wishes)       refuses what cannot be designed, and says why
 """
 
 from __future__ import annotations
@@ -43,23 +43,19 @@ class Wishes:
     stop_band: tuple[float, ...] = option((), "Bands without harmonics [Hz]: 4,6 or 4,6,11,13.")
     symmetric: bool = option(False, "Mirror-symmetric links: p4 = p15 = 0.")
     home: tuple[float, ...] | None = option(
-        None, "Posture to start from [rad], one a joint: 0,-1.57,0."
-    )
+        None, "Posture to start from [rad], one a joint: 0,-1.57,0.")
     rest: bool = option(True, "In motion at both ends, with run-in and run-out.", "--no-rest")
     periods: int = option(1, "How often the period is repeated.")
     sample_time: float = 1e-3  # [s]
     friction: bool | None = option(
-        None,
-        "Count columns of friction as well. [on every arm but the RRR arm]",
-        "--friction/--no-friction",
-    )
+        None, "Count columns of friction as well. [on every arm but the RRR arm]",
+        "--friction/--no-friction")
     noise: tuple[float, ...] | None = None  # [N m] std of the torque; None: 1 % of its limit
     torque_share: float = option(0.9, "Share of the torque limits that the motion may use.")
     # a loop overshoots by up to 4 %
     speed_share: float = option(0.95, "Share of the speed limits that the motion may use.")
     tip_box: tuple[float, ...] | None = option(
-        None, "Box for the tip [m]: x from,to, y from,to, z from,to."
-    )
+        None, "Box for the tip [m]: x from,to, y from,to, z from,to.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +78,8 @@ class Task:
         return peaks(self.problem.limits, self.problem.chain, motion, self.arm, periodic=periodic)
 
 
-def plan_task(
-    robot: RobotDescription, arm: Arm | None, wishes: Wishes, earlier: Array | None = None
-) -> Task:
+def plan_task(robot: RobotDescription, arm: Arm | None, wishes: Wishes,
+              earlier: Array | None = None) -> Task:
     """Decide what was left open.
 
     Args:
@@ -101,13 +96,8 @@ def plan_task(
     friction = wishes.friction if wishes.friction is not None else not direct
     columns = arm_columns(body, friction=friction)
     box = None if wishes.tip_box is None else _box(wishes.tip_box)
-    limits = limits_of(
-        robot,
-        torque=arm is not None,
-        torque_share=wishes.torque_share,
-        speed_share=wishes.speed_share,
-        tip_box=box,
-    )
+    limits = limits_of(robot, torque=arm is not None, torque_share=wishes.torque_share,
+                       speed_share=wishes.speed_share, tip_box=box)
     harmonics = _harmonics(wishes, robot.n_joints, direct)
     samples = round(harmonics.period / wishes.sample_time) * wishes.periods
     beta = drag = None
@@ -115,27 +105,14 @@ def plan_task(
         beta = _beta(columns, arm)
         if not friction:
             drag = np.array([_modelled(arm, j, k.velocity) for j, k in enumerate(robot.joints)])
-    goal = replace(
-        _goal(wishes, robot, columns, beta),
-        samples=samples,
-        earlier=None if earlier is None else earlier / samples,
-    )
+    goal = replace(_goal(wishes, robot, columns, beta), samples=samples,
+                   earlier=None if earlier is None else earlier / samples)
     problem = ArmProblem(columns, serial_chain(robot), limits, beta, goal, drag)
     low, high = _ranges(robot)
     middle, half = 0.5 * (low + high), 0.25 * (high - low)
     home = _home(robot, wishes.home) if wishes.rest or wishes.home is not None else None
-    return Task(
-        robot,
-        arm,
-        problem,
-        harmonics,
-        _speed(robot),
-        wishes.rest,
-        home,
-        (middle - half, middle + half),
-        wishes.sample_time,
-        wishes.periods,
-    )
+    return Task(robot, arm, problem, harmonics, _speed(robot), wishes.rest, home,
+                (middle - half, middle + half), wishes.sample_time, wishes.periods)
 
 
 def _home(robot: RobotDescription, asked: Sequence[float] | None) -> Array:
@@ -145,22 +122,14 @@ def _home(robot: RobotDescription, asked: Sequence[float] | None) -> Array:
     """
     if asked is not None:
         if len(asked) != robot.n_joints:
-            raise UsageError(
-                "C02",
-                f"{len(asked)} positions for {robot.n_joints} joints",
-                where="--home",
-                remedy="give one a joint, in rad",
-            )
+            raise UsageError("C02", f"{len(asked)} positions for {robot.n_joints} joints",
+                             where="--home", remedy="give one a joint, in rad")
         for j, (value, joint) in enumerate(zip(asked, robot.joints, strict=True), 1):
             low, high = joint.position
             if not low < value < high:
                 raise UsageError(
-                    "C08",
-                    f"home of joint {j}, {value:g}, is not within its position limits "
-                    f"{low:g} to {high:g}",
-                    where="--home",
-                    remedy="give another home",
-                )
+                    "C08", f"home of joint {j}, {value:g}, is not within its position limits "
+                    f"{low:g} to {high:g}", where="--home", remedy="give another home")
         return np.array(asked, dtype=np.float64)
     if rrr.fits(robot):
         return np.array([0.0, -0.5 * np.pi - robot.joints[1].offset, -robot.joints[2].offset])
@@ -181,12 +150,9 @@ def _ranges(robot: RobotDescription) -> tuple[Array, Array]:
 def _box(numbers: tuple[float, ...]) -> Array:
     box = np.array(numbers, dtype=np.float64)
     if box.size != 6 or not (box[::2] < box[1::2]).all():  # noqa: PLR2004
-        raise UsageError(
-            "C02",
-            "a box is six numbers, from below to above in x, y and z",
-            where="--tip-box",
-            remedy="write for example --tip-box=-0.5,0.5,-0.5,0.5,0.1,1.2 [m]",
-        )
+        raise UsageError("C02", "a box is six numbers, from below to above in x, y and z",
+                         where="--tip-box",
+                         remedy="write for example --tip-box=-0.5,0.5,-0.5,0.5,0.1,1.2 [m]")
     return box.reshape(3, 2)
 
 
@@ -201,12 +167,8 @@ def _harmonics(wishes: Wishes, joints: int, direct: bool) -> Harmonics:
 
 def _each(values: Sequence[float], joints: int, where: str) -> tuple[float, ...]:
     if len(values) not in (1, joints):
-        raise UsageError(
-            "C02",
-            f"{len(values)} values for {joints} joints",
-            where=where,
-            remedy="give one, or one a joint",
-        )
+        raise UsageError("C02", f"{len(values)} values for {joints} joints", where=where,
+                         remedy="give one, or one a joint")
     return tuple(values) * joints if len(values) == 1 else tuple(values)
 
 
@@ -216,46 +178,31 @@ def _speed(robot: RobotDescription) -> Array:
     slow = np.array([joint.acceleration for joint in robot.joints])
     speed = np.where(np.isfinite(speed), speed, slow / (2.0 * np.pi * CONFIG.knee_hz))
     for j in np.flatnonzero(~np.isfinite(speed)):
-        place = (
-            " in its <limit> in the URDF"
-            if robot.urdf_text
-            else ", and best acceleration and torque, in its [[joint]]"
-        )
-        raise UsageError(
-            "C08",
-            f"joint {j + 1} '{robot.joints[j].name}' has no limit of speed and "
-            "none of acceleration",
-            where=robot.name,
-            remedy=f"write velocity{place}",
-        )
+        place = (" in its <limit> in the URDF" if robot.urdf_text
+                 else ", and best acceleration and torque, in its [[joint]]")
+        raise UsageError("C08", f"joint {j + 1} '{robot.joints[j].name}' has no limit of speed and "
+                         "none of acceleration", where=robot.name, remedy=f"write velocity{place}")
     return speed
 
 
-def _goal(wishes: Wishes, robot: RobotDescription, columns: ArmColumns, beta: Array | None) -> Goal:
+def _goal(wishes: Wishes, robot: RobotDescription, columns: ArmColumns,
+          beta: Array | None) -> Goal:
     if wishes.symmetric and not set(SYMMETRIC) <= set(columns.names):
-        raise UsageError(
-            "C02", "only the RRR arm has p4 and p15", where="--symmetric", remedy="leave it out"
-        )
+        raise UsageError("C02", "only the RRR arm has p4 and p15", where="--symmetric",
+                         remedy="leave it out")
     criterion = "A" if wishes.criterion == "default" else wishes.criterion
     if criterion not in CRITERIA:
-        raise UsageError(
-            "C02",
-            f"'{wishes.criterion}' is no criterion",
-            where="--criterion",
-            remedy=f"one of: default, {', '.join(CRITERIA)}",
-        )
+        raise UsageError("C02", f"'{wishes.criterion}' is no criterion", where="--criterion",
+                         remedy=f"one of: default, {', '.join(CRITERIA)}")
     ceiling = wishes.cond_max
     # of other arms no such ceiling is known: a wrist's small columns alone make the number large
     own = rrr.fits(robot) and not columns.friction
     if ceiling is None and wishes.criterion == "default" and own:
         ceiling = CONFIG.ceiling
     if ceiling is not None and ceiling <= LOWER_BOUND and rrr.fits(robot):
-        raise UsageError(
-            "C08",
-            f"no motion of this arm has a condition number below {LOWER_BOUND:.5f}",
-            where="--cond-max",
-            remedy=f"allow more; {CONFIG.ceiling:g} is a good ceiling",
-        )
+        raise UsageError("C08", f"no motion of this arm has a condition number below "
+                         f"{LOWER_BOUND:.5f}", where="--cond-max",
+                         remedy=f"allow more; {CONFIG.ceiling:g} is a good ceiling")
     left_out = SYMMETRIC if wishes.symmetric else ()
     kept = np.flatnonzero([name not in left_out for name in columns.names])
     if wishes.noise is not None:
@@ -271,7 +218,7 @@ def _goal(wishes: Wishes, robot: RobotDescription, columns: ArmColumns, beta: Ar
 def _beta(columns: ArmColumns, arm: Arm) -> Array:
     """Return the model's value of every column; friction as a straight line, or of the limits."""
     beta = np.zeros(len(columns.names))
-    beta[: columns.rigid_count] = arm.p
+    beta[:columns.rigid_count] = arm.p
     if columns.friction:
         for j, joint in enumerate(arm.robot.joints):
             fast = joint.velocity if np.isfinite(joint.velocity) else 1.0
@@ -281,7 +228,7 @@ def _beta(columns: ArmColumns, arm: Arm) -> Array:
             elif np.isfinite(joint.torque):
                 friction = (CONFIG.coulomb * joint.torque, CONFIG.viscous * joint.torque / fast)
             first = columns.rigid_count + 3 * j
-            beta[first : first + 2] = friction
+            beta[first:first + 2] = friction
     return beta
 
 

@@ -36,9 +36,8 @@ class Peak:
     share: float  # 1 is the limit: of the way from the middle of the range, or from zero
 
 
-def peaks(
-    limits: Iterable[Limit], chain: SerialChain, motion: Array, arm: Arm | None, *, periodic: bool
-) -> tuple[Peak, ...]:
+def peaks(limits: Iterable[Limit], chain: SerialChain, motion: Array, arm: Arm | None, *,
+          periodic: bool) -> tuple[Peak, ...]:
     """Return the peaks of motion (3, joints, samples) on the grid of `CONFIG.grid`.
 
     Args:
@@ -77,19 +76,11 @@ def _peak(one: Limit, low: float, high: float) -> Peak:
     middle = 0.5 * (one.low + one.high)
     if not np.isfinite(middle):  # open at one end
         middle = one.high - 1.0 if np.isfinite(one.high) else one.low + 1.0
-    shares = [
-        (value - middle) / (end - middle) if np.isfinite(end) else -np.inf
-        for value, end in ((low, one.low), (high, one.high))
-    ]
+    shares = [(value - middle) / (end - middle) if np.isfinite(end) else -np.inf
+              for value, end in ((low, one.low), (high, one.high))]
     upper = shares[1] >= shares[0]
-    return Peak(
-        one.joint,
-        one.quantity,
-        high if upper else low,
-        one.high if upper else one.low,
-        one.unit,
-        float(max(shares)),
-    )
+    return Peak(one.joint, one.quantity, high if upper else low, one.high if upper else one.low,
+                one.unit, float(max(shares)))
 
 
 def worst(found: Iterable[Peak]) -> Peak | None:
