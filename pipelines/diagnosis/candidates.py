@@ -28,6 +28,7 @@ from pipelines.estimation.joint_table import Array, Indices, Table
 
 __all__ = ["Dictionary", "Group", "Kind", "laid"]
 
+_SMALL = 1e-6  # numerics: an amplitude that every range holds which holds its sign
 _ROUNDED = 1e-9  # numerics: of travel [rad or m], or share of an order, that is rounding
 
 # of compliance rows show the class, responses the cause
@@ -45,7 +46,8 @@ class Group:
     standing: bool  # healthy machines have it in small
     kind: Kind
     reads_torque: bool = False  # its columns hold the logged torque itself
-    length: float | None = None  # [s] of the lag that its columns are of; None: they hold for any
+    amplitude: float | None = None  # that its columns are exact for; None: they are for any
+    sign: int = 0  # of its only amplitude, where physics gives it
 
     @property
     def family(self) -> str:
@@ -145,8 +147,9 @@ def _lay(
         parts.append(table)
         shapes, width, _ = one.table.shape
         for number in range(one.first, one.first + shapes):
-            stands, length = number in standing[key], _length(family.shapes[number])
-            groups.append(Group(key, number, seen, width, stands, kind, reads, length))
+            shape, stands = family.shapes[number], number in standing[key]
+            known = _amplitude(shape), _sign(shape) if width == 1 else 0
+            groups.append(Group(key, number, seen, width, stands, kind, reads, *known))
             seen += width
 
 
@@ -158,9 +161,17 @@ def laid(rows: Rows, family: Family, arm: Arm) -> Iterator[tuple[Laid, Table]]:
         yield one, rows.table(one.table.reshape(shapes * width, -1), one.rows).compact()
 
 
-def _length(shape: Effect) -> float | None:
-    """Return the amplitude that the columns of a shape are exact for; None: they are its slope."""
-    return shape.looked_for or None if isinstance(shape, TorqueLag) else None
+def _amplitude(shape: Effect) -> float | None:
+    """Return the amplitude of a lag's columns, or the one that physics gives; None: it is free."""
+    if isinstance(shape, TorqueLag):
+        return shape.looked_for or None
+    return shape.parameters.fixed[0] if shape.parameters.fixed else None
+
+
+def _sign(shape: Effect) -> int:
+    """Return the sign that the only amplitude of a shape has; 0: it may have either."""
+    can = {sign: shape.possible(shape.values([sign * _SMALL])) for sign in (-1, 1)}
+    return sum(sign for sign, possible in can.items() if possible)
 
 
 def _standing(family: Family, dataset: Dataset) -> set[int]:

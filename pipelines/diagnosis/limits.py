@@ -84,13 +84,16 @@ def limits_of(later: Later, state: State, baseline: Baseline) -> Limits:
     solved = state.factor.solve(cross)
     for group, square in zip(later.dictionary.groups, later.squares, strict=True):
         at, family = group.columns, later.dictionary.families.get(group.key)
-        if group.kind != "named" or family is None or group.length is not None:
+        if group.kind != "named" or family is None:
+            continue
+        shape = family.shapes[group.shape]
+        if group.amplitude is not None and shape.parameters.fixed is None:  # a lag's slope is there
             continue
         length = np.sqrt(np.maximum(np.diag(square), 0.0))
         part = np.abs(solved[:, at]) * norms[:, None] / np.maximum(length, 1e-300)
         hidden = square - cross[:, at].T @ solved[:, at]
         shapes.setdefault(group.key, []).append(
-            _Shape(family.shapes[group.shape], hidden, length, part, group)
+            _Shape(shape, hidden, length, part, group)
         )
     there = {(one.effect.name, one.effect.joint) for one in state.model.effects}
     told = [_limit(later, own, baseline) for key, own in shapes.items() if key not in there]

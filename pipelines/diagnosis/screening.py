@@ -54,18 +54,23 @@ def screen(
         amplitudes = (vectors[:, seen] @ (z / values[seen])) / unit
         gain = float(np.sum(z**2 / values[seen]))
         found = Screened(group, gain, int(seen.sum()), amplitudes)
-        out.append(found if group.length is None else _at_length(found, group.length))
+        if group.amplitude is not None:
+            found = _at_amplitude(found, group.amplitude)
+        elif group.sign * found.amplitudes[0] < 0.0:  # the best that it can have is none
+            found = replace(found, gain=0.0)
+        out.append(found)
     return out
 
 
-def _at_length(one: Screened, length: float) -> Screened:
-    """Return a lag with the length T that its columns are of.
+def _at_amplitude(one: Screened, known: float) -> Screened:
+    """Return a candidate with the amplitude that its columns are exact for.
 
-    The gain T_c = H a² falls by H (a - T)²: a lag of another length has other columns.
+    The gain T_c = H a² falls by H (a - known)²: a lag of another length has other columns, and a
+    gap another curve.
     """
     best = float(one.amplitudes[0])
-    share = 1.0 - (1.0 - length / best) ** 2 if best > 0.0 else 0.0
-    return replace(one, gain=max(one.gain * share, 0.0), amplitudes=np.array([length]))
+    share = 1.0 - (1.0 - known / best) ** 2 if best > 0.0 else 0.0
+    return replace(one, gain=max(one.gain * share, 0.0), amplitudes=np.array([known]))
 
 
 def price(x: Array) -> float:

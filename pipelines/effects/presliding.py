@@ -66,11 +66,11 @@ class Presliding(Effect):
         return self.on_own_row(arm, u)
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """From a thousandth to a tenth of the travel."""
+        """From a ten-thousandth to a tenth of the travel."""
         travel = float(np.ptp(self.own(motion.q))) or 1.0
         fast = float(np.abs(self.own(motion.dq)).max(initial=0.0))
         slow = self.within("breakaway_speed", EFFECTS.falling * fast)
-        for distance in np.geomspace(1e-3 * travel, 0.1 * travel, 9).tolist():
+        for distance in np.geomspace(1e-4 * travel, 0.1 * travel, 13).tolist():
             yield replace(self, distance=self.within("distance", distance), breakaway_speed=slow)
 
     def forms(self) -> tuple[Self, ...]:
