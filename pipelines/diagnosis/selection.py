@@ -347,13 +347,30 @@ class _Step:
         found = list[Candidate]()
         for _ in range(_TURNS):
             asked += [(later.form(one.group), one.amplitudes, one.gain, None) for one in named]
-            tried = (_candidate(later, self.state, *one) for one in asked)
-            found += [one for one in tried if one and one.possible and self._relevant(one)]
+            tried = [one for x in asked if (one := _candidate(later, self.state, *x)) is not None]
+            found += [one for one in tried if one.possible and self._relevant(one)]
+            most = max((self._saved(one) for one in found), default=0.0)
+            larger = [one for one in tried if not one.possible and self._saved(one) > most]
+            others = (by for one in larger if (by := self._by_another_law(one)) is not None)
+            found += [one for one in others if self._relevant(one)]
             seen |= {one.group.key for one in named}
             if found:
                 break
             asked, named = [], self._promising(seen)
         return found
+
+    def _saved(self, one: Candidate) -> float:
+        return self.state.cost - one.state.cost
+
+    def _by_another_law(self, one: Candidate) -> Candidate | None:
+        """Return a cause by the first of its other laws by which its numbers are possible."""
+        last = one.state.model.effects[-1]
+        for form in last.effect.forms()[1:] if last.log is None else ():
+            start = np.array(last.amplitudes)
+            other = _candidate(self.later, self.state, form, start, one.gain)
+            if other is not None and other.possible:
+                return other
+        return None
 
     def _unnamed(self, compliant: bool) -> dict[Key, State]:
         """Return the best shape without a name, and, where asked, the best compliance."""
