@@ -365,7 +365,7 @@ class _Step:
     def _by_another_law(self, one: Candidate) -> Candidate | None:
         """Return a cause by the first of its other laws by which its numbers are possible."""
         last = one.state.model.effects[-1]
-        for form in last.effect.forms()[1:] if last.log is None else ():
+        for form in _laws(last.effect)[1:] if last.log is None else ():
             start = np.array(last.amplitudes)
             other = _candidate(self.later, self.state, form, start, one.gain)
             if other is not None and other.possible:
@@ -524,24 +524,31 @@ def best_law(later: Later, state: State, chosen: Candidate) -> Candidate:
     """Return the chosen cause by the law of it that predicts best."""
     one, every = chosen.state.model.effects[-1], [chosen]
     if one.log is None:
-        for form in one.effect.forms()[1:]:
+        for form in _laws(one.effect)[1:]:
             other = _candidate(later, state, form, np.array(one.amplitudes), chosen.gain)
             if other is not None and other.possible and not other.noisy:
                 every.append(other)
     return min(every, key=lambda one: float(one.scores(later).sum())) if every[1:] else chosen
 
 
+def _laws(effect: Effect, further: Sequence[Effect] = ()) -> list[Effect]:
+    """Return an effect and the laws it may follow instead, which differ in what is not fitted."""
+    laws = dict[object, Effect]()
+    for x in (effect, *effect.forms(), *further):
+        held = tuple((f.name, getattr(x, f.name)) for f in fields(x) if f.name not in x.free)
+        laws.setdefault(held, x)
+    return list(laws.values())
+
+
 def laws_of(later: Later, end: State, place: int) -> list[tuple[Named, float]]:
     """Return a cause by each law and link that it may have, and how probable; its own first."""
     one, rest = end.model.effects[place], end.model.without(place)
-    every, laws = [one.effect, *one.effect.forms()], dict[object, Effect]()
-    if any(q.link or q.joint for q in one.effect.parameters):
-        every += later.dictionary.families[one.effect.name, one.effect.joint].shapes
-    for x in every:  # laws that differ in fitted numbers are the same law
-        laws.setdefault(tuple(getattr(x, f.name) for f in fields(x) if f.name not in x.free), x)
+    elsewhere = any(q.link or q.joint for q in one.effect.parameters)
+    key = one.effect.name, one.effect.joint
+    laws = _laws(one.effect, later.dictionary.families[key].shapes if elsewhere else ())
     if len(laws) > 1 and one.log is None:
         before = later.fit(rest, end.theta, later.belief_of(rest))
-        tried = [_candidate(later, before, x, np.array(one.amplitudes)) for x in laws.values()]
+        tried = [_candidate(later, before, x, np.array(one.amplitudes)) for x in laws]
         good = [c for c in tried if c is not None and c.possible and not c.noisy]
         if tried[0] in good:
             weight = probabilities({k: c.scores(later) for k, c in enumerate(good)}, later.config)

@@ -74,10 +74,11 @@ class Presliding(Effect):
             yield replace(self, distance=self.within("distance", distance), breakaway_speed=slow)
 
     def forms(self) -> tuple[Self, ...]:
-        other = replace(self, exponent=EFFECTS.other_exponent)
-        falling = replace(self, elastic=-1.0, breakaway=EFFECTS.breakaway)
-        halfway, loops = replace(self, elastic=EFFECTS.halfway), replace(other, inner_loops=1.0)
-        return halfway, other, loops, falling
+        plain = replace(self, exponent=1.0, inner_loops=0.0, breakaway=0.0)
+        halfway = replace(plain, elastic=EFFECTS.halfway)
+        other = replace(plain, exponent=EFFECTS.other_exponent)
+        falling = replace(plain, elastic=-1.0, breakaway=EFFECTS.breakaway)
+        return halfway, other, replace(other, inner_loops=1.0), falling
 
     @property
     def free(self) -> tuple[str, ...]:
