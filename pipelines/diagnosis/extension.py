@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from pipelines.diagnosis.candidate_fits import Candidate, refit
 from pipelines.diagnosis.compliance import compliance
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import pose
@@ -20,7 +21,6 @@ from pipelines.diagnosis.findings import Worth, extension_of, findings_of, weigh
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.result import Extended, Rejected
 from pipelines.diagnosis.screening import best_of
-from pipelines.diagnosis.selection import Candidate, refit
 from pipelines.diagnosis.standing import standing_of
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.trained import covariance, train

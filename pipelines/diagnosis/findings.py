@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from pipelines.diagnosis.candidate_fits import laws_of
 from pipelines.diagnosis.compliance import Compliance
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.result import (
@@ -27,7 +28,7 @@ from pipelines.diagnosis.result import (
     Value,
 )
 from pipelines.diagnosis.result import Standing as Told
-from pipelines.diagnosis.selection import Round, laws_of
+from pipelines.diagnosis.selection import Round
 from pipelines.diagnosis.state import Fit, State
 from pipelines.diagnosis.trained import Standing, Trained, parameters, told
 from pipelines.dynamics.arm import Acting

@@ -92,9 +92,7 @@ def limits_of(later: Later, state: State, baseline: Baseline) -> Limits:
         length = np.sqrt(np.maximum(np.diag(square), 0.0))
         part = np.abs(solved[:, at]) * norms[:, None] / np.maximum(length, 1e-300)
         hidden = square - cross[:, at].T @ solved[:, at]
-        shapes.setdefault(group.key, []).append(
-            _Shape(shape, hidden, length, part, group)
-        )
+        shapes.setdefault(group.key, []).append(_Shape(shape, hidden, length, part, group))
     there = {(one.effect.name, one.effect.joint) for one in state.model.effects}
     told = [_limit(later, own, baseline) for key, own in shapes.items() if key not in there]
     return Limits(

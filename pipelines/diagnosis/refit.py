@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil
 
 import numpy as np
 
@@ -25,10 +24,8 @@ from pipelines.diagnosis.state import State
 from pipelines.diagnosis.unnamed import FORM, Key
 from pipelines.effects.base import Effect, FrictionLaw
 from pipelines.effects.config import ORDERS
-from pipelines.estimation.bootstrap import chi2_bound
 from pipelines.estimation.exact_model import Exact, Named
-from pipelines.estimation.joint_table import Array, Arrow, Indices, Table, by_joint, gains, in_rows
-from pipelines.estimation.rows import END
+from pipelines.estimation.joint_table import Array, Arrow, Indices, Table
 
 __all__ = ["Later"]
 
@@ -289,76 +286,6 @@ class Later:
         both = (self.rows.torque(one) for one in (model, replace(model, effects=effects)))
         return sum(price(a - b) for a, b in zip(*both, strict=True))
 
-    def possible(self, state: State, explained: float | None = None, place: int = -1) -> bool:
-        """Return whether an effect can be a cause with its numbers and their deviations.
-
-        An amplitude outside its range may be within it by its standard deviation, but not by the
-        other sign, and one that surely is as slight as in any arm is no cause; a number of a shape
-        that is held at the end of its range has its best value outside. What it costs to be in its
-        range, (distance / std)², may be a share of what the effect explains, for no law is exact.
-
-        Args:
-            explained: cost that the effect saves; None: (amplitude / std)², which it nearly is.
-            place: of the effect in the model; -1: the last.
-        """
-        slopes, names = self.slopes(state.model)
-        factor, first = state.factor, self.base.width
-        std = np.sqrt(factor.inverse_diagonal[first:]) / slopes.lengths
-        step = factor.solve(state.slope)[first:] / slopes.lengths
-        one, place = state.model.effects[place], place % len(state.model.effects)
-        if explained is None:
-            at = [k for k, n in enumerate(names) if n[:2] == (1, place) and n[2].isdigit()]
-            sizes = np.array(one.amplitudes)[: len(at)]
-            explained = float(np.max((sizes / std[at]) ** 2, initial=0.0))
-        deviations = np.sqrt(max(self.config.deviations**2, self.config.relevance * explained))
-        within, timing = one.possible, self.rows.data.logs[0].motion.sample_time
-        if one.effect.parameters.reads_torque and self._mostly_acting(one.effect):
-            return False
-        for (of_effect, which, name), by, reach in zip(names, step, deviations * std, strict=True):
-            if not of_effect or which != place:
-                continue
-            if not name.isdigit():
-                if abs(by) > reach and one.effect.at_end(name, float(by)):
-                    return False
-                continue
-            if abs(one.amplitudes[int(name)]) + reach < one.effect.parameters.slight(timing):
-                return False
-            for way in np.outer((-reach, reach), _TRIED).ravel():
-                amplitudes = np.array(one.amplitudes)
-                amplitudes[int(name)] += way
-                if amplitudes[int(name)] * one.amplitudes[int(name)] > 0.0:
-                    within |= one.effect.possible(one.effect.values(amplitudes))
-        return within
-
-    def _mostly_acting(self, effect: Effect) -> bool:
-        """Return whether an effect acts in most rows; a joint clipped so follows nothing."""
-        logs, arm = self.rows.data.logs, self.dataset.arm
-        table = [np.any(effect.columns(one.motion, arm), axis=2) for one in logs]
-        acting = [one.at_rows(x).T.ravel() for one, x in zip(logs, table, strict=True)]
-        own = self.rows.data.counts & (self.rows.joint == (effect.joint or 1) - 1)
-        return float(np.concatenate(acting)[own].mean()) > _HALF
-
-    def follows_noise(self, state: State, explained: float) -> bool:
-        """Return whether the last effect is one of drive or encoder whose slopes follow the noise.
-
-        In closed loop motion and torque answer the noise a moment later, and a lag is not
-        distinguished from that (Ljung 1999, 16.6). What slopes gain on the noise of another moment,
-        as far away as the low-pass carries it, has a χ² distribution where they are independent, as
-        far as laws are exact.
-        """
-        last, rows = state.model.effects[-1], self.rows
-        if last.effect.acts_on == "load":
-            return False
-        own = np.arange(state.effects.width) >= state.effects.width - last.count
-        columns, rest = (state.effects.take(np.flatnonzero(x)) for x in (own, ~own))
-        left, near = in_rows(state.residual, rows.joint), ceil(END * self.config.keep)
-        each = (rows.data.moved(left, by) for by in range(-near, near + 1) if by)
-        moments = [by_joint(x, rows.joint, rows.n_joints) for x in each]
-        others = Table.stacked([state.known.base, rest])
-        most = gains(columns, others, state.known.beside(rest), moments).max()
-        chance = chi2_bound(self.config.alpha / len(moments), last.count)
-        return bool(most > max(chance, self.config.relevance * explained))
-
     def acting(self, state: State) -> Array:
         """Return the share of each joint (joints,) in the torque of all effects.
 
@@ -572,8 +499,6 @@ class Later:
 def _leaves(model: Exact, name: tuple[int, int, str], by: float) -> bool:
     """Return whether a number is at the end of its range, and `by` points out of it."""
     of_effect, place, number = name
-    if number.isdigit():
-        return False
     owner = model.effects[place].effect if of_effect else model.columns.laws[place]
     return owner.at_end(number, by)
 

@@ -8,54 +8,35 @@ selection.rounds              the last of them says why the search ended
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from pipelines.diagnosis.baseline import Baseline
+from pipelines.diagnosis.candidate_fits import (
+    Candidate,
+    best_law,
+    candidate,
+    laws,
+    possible,
+    scores_of,
+)
 from pipelines.diagnosis.events import Window, push_of
 from pipelines.diagnosis.refit import Later
-from pipelines.diagnosis.score import confidence_set, log_scores, probabilities
+from pipelines.diagnosis.score import confidence_set, probabilities
 from pipelines.diagnosis.screening import Screened, best_of
 from pipelines.diagnosis.state import Fit, State
 from pipelines.diagnosis.unnamed import Key, in_words
 from pipelines.dynamics.arm import Acting
 from pipelines.effects.base import Effect
-from pipelines.effects.friction import Coulomb
-from pipelines.estimation.candidate_columns import first_samples
-from pipelines.estimation.exact_model import Exact, Named
+from pipelines.estimation.exact_model import Exact
 from pipelines.estimation.joint_table import Array
 
-__all__ = ["Cause", "Round", "SearchStart", "Selection", "best_law", "laws_of", "refit", "select"]
+__all__ = ["Cause", "Round", "SearchStart", "Selection", "select"]
 
 
 _TURNS = 2  # numerics: groups of promising causes that are refitted until one is a cause
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A cause that was refitted exactly."""
-
-    key: Key
-    gain: float  # of screening
-    state: State
-    possible: bool  # its numbers are such as it can have
-    noisy: bool = False  # the answer of the loop to noise looks like it
-
-    @property
-    def numbers(self) -> int:
-        """Numbers that it adds to the model."""
-        return self.state.model.effects[-1].count
-
-    @property
-    def event(self) -> bool:
-        """True for a cause of one moment in one log."""
-        return self.state.model.effects[-1].log is not None
-
-    def scores(self, later: Later) -> Array:
-        """Return the predictive score of each block."""
-        return _scores(later, self.state, self.numbers)
 
 
 @dataclass(frozen=True)
@@ -347,7 +328,7 @@ class _Step:
         found = list[Candidate]()
         for _ in range(_TURNS):
             asked += [(later.form(one.group), one.amplitudes, one.gain, None) for one in named]
-            tried = [one for x in asked if (one := _candidate(later, self.state, *x)) is not None]
+            tried = [one for x in asked if (one := candidate(later, self.state, *x)) is not None]
             found += [one for one in tried if one.possible and self._relevant(one)]
             most = max((self._saved(one) for one in found), default=0.0)
             larger = [one for one in tried if not one.possible and self._saved(one) > most]
@@ -365,9 +346,9 @@ class _Step:
     def _by_another_law(self, one: Candidate) -> Candidate | None:
         """Return a cause by the first of its other laws by which its numbers are possible."""
         last = one.state.model.effects[-1]
-        for form in _laws(last.effect)[1:] if last.log is None else ():
+        for form in laws(last.effect)[1:] if last.log is None else ():
             start = np.array(last.amplitudes)
-            other = _candidate(self.later, self.state, form, start, one.gain)
+            other = candidate(self.later, self.state, form, start, one.gain)
             if other is not None and other.possible:
                 return other
         return None
@@ -408,8 +389,8 @@ class _Step:
         """Return the winner of the predictive scores with its alternatives, or why nothing wins."""
         later, width = self.later, self.state.effects.width
         scores = {one.key: one.scores(later) for one in tried}
-        free = {k: _scores(later, own, own.effects.width - width) for k, own in others.items()}
-        without = _scores(later, self.state).sum()
+        free = {k: scores_of(later, own, own.effects.width - width) for k, own in others.items()}
+        without = scores_of(later, self.state).sum()
         best = in_words(min(scores, key=lambda key: scores[key].sum()))
         fails = f"{best} does not pay on blocks that it was not fitted to"
         better = {k: v for k, v in (scores | free).items() if v.sum() < without}
@@ -421,7 +402,7 @@ class _Step:
             first = min(better, key=lambda key: better[key].sum())
             return None, None, f"{in_words(first)} predicts better than {best}"
         pick = min(named, key=lambda one: scores[one.key].sum())
-        unchanged = _scores(later, later.unchanged(self.state, pick.key))
+        unchanged = scores_of(later, later.unchanged(self.state, pick.key))
         pays = confidence_set({"with": scores[pick.key], "without": unchanged}, later.config)
         if "without" in pays and not pick.event:
             return None, None, fails
@@ -478,84 +459,6 @@ class _Step:
         return [best] if 0.0 < saved(best.state, best.numbers) > exact * free else []
 
 
-def _candidate(
-    later: Later,
-    state: State,
-    effect: Effect,
-    amplitudes: Array,
-    gain: float = 0.0,
-    log: int | None = None,
-) -> Candidate | None:
-    """Return the cause refitted; None where its fit fails, which costs that candidate alone."""
-    start = np.zeros(effect.columns(first_samples(later.rows.data), later.dataset.arm).shape[2])
-    start[: len(amplitudes)] = amplitudes[: len(start)]
-    belief = later.beside(state.belief, effect)
-    model = state.model.with_effect(effect, start, log=log)
-    try:
-        others = _plainer(model) if later.dataset.reference is None else ()
-        begun = [later.begun(one, state.theta, belief) for one in (model, *others)]
-        best = min(begun, key=lambda one: one.cost)
-        fitted = later.fit(best.model, best.theta, belief)
-        explained = state.cost - fitted.cost
-        possible = later.possible(fitted, explained) and bool(np.isfinite(fitted.losses).all())
-        noisy = possible and later.follows_noise(fitted, explained)
-    except np.linalg.LinAlgError:
-        return None
-    light = replace(fitted)  # without the columns that were computed for it: they take most memory
-    return Candidate((effect.name, effect.joint), gain, light, possible, noisy)
-
-
-def _plainer(model: Exact) -> tuple[Exact, ...]:
-    """Return the model with the plain sign change at its last effect's joint, if it has another.
-
-    Fitted without the effect, the curve of the sign change has taken some of it.
-    """
-    columns, joint = model.columns, model.effects[-1].effect.joint
-    plain = tuple(
-        law.plain() if law.joint == joint and isinstance(law, Coulomb) else law
-        for law in columns.laws
-    )
-    if plain == tuple(columns.laws):
-        return ()
-    return (replace(model, columns=replace(columns, laws=plain)),)
-
-
-def best_law(later: Later, state: State, chosen: Candidate) -> Candidate:
-    """Return the chosen cause by the law of it that predicts best."""
-    one, every = chosen.state.model.effects[-1], [chosen]
-    if one.log is None:
-        for form in _laws(one.effect)[1:]:
-            other = _candidate(later, state, form, np.array(one.amplitudes), chosen.gain)
-            if other is not None and other.possible and not other.noisy:
-                every.append(other)
-    return min(every, key=lambda one: float(one.scores(later).sum())) if every[1:] else chosen
-
-
-def _laws(effect: Effect, further: Sequence[Effect] = ()) -> list[Effect]:
-    """Return an effect and the laws it may follow instead, which differ in what is not fitted."""
-    laws = dict[object, Effect]()
-    for x in (effect, *effect.forms(), *further):
-        held = tuple((f.name, getattr(x, f.name)) for f in fields(x) if f.name not in x.free)
-        laws.setdefault(held, x)
-    return list(laws.values())
-
-
-def laws_of(later: Later, end: State, place: int) -> list[tuple[Named, float]]:
-    """Return a cause by each law and link that it may have, and how probable; its own first."""
-    one, rest = end.model.effects[place], end.model.without(place)
-    elsewhere = any(q.link or q.joint for q in one.effect.parameters)
-    key = one.effect.name, one.effect.joint
-    laws = _laws(one.effect, later.dictionary.families[key].shapes if elsewhere else ())
-    if len(laws) > 1 and one.log is None:
-        before = later.fit(rest, end.theta, later.belief_of(rest))
-        tried = [_candidate(later, before, x, np.array(one.amplitudes)) for x in laws]
-        good = [c for c in tried if c is not None and c.possible and not c.noisy]
-        if tried[0] in good:
-            weight = probabilities({k: c.scores(later) for k, c in enumerate(good)}, later.config)
-            return [(c.state.model.effects[-1], weight[k]) for k, c in enumerate(good)]
-    return [(one, 1.0)]
-
-
 def _reformed(later: Later, state: State) -> tuple[Sequence[int], State]:
     """Return each cause by the law of it that predicts best now, and which causes are kept.
 
@@ -565,7 +468,7 @@ def _reformed(later: Later, state: State) -> tuple[Sequence[int], State]:
     for place in range(len(state.model.effects)):
         one, rest = state.model.effects[0], state.model.without(0)
         before = later.fit(rest, state.theta, later.belief_of(rest))
-        same = _candidate(later, before, one.effect, np.array(one.amplitudes), log=one.log)
+        same = candidate(later, before, one.effect, np.array(one.amplitudes), log=one.log)
         if same is None or not same.possible:
             state = before
         else:
@@ -586,30 +489,12 @@ def _backward(later: Later, causes: list[Cause], end: State) -> tuple[list[Cause
             continue
         model = end.model.without(place)
         without = later.fit(model, end.theta, later.belief_of(model))
-        scores = {"with": _scores(later, end), "without": _scores(later, without)}
+        scores = {"with": scores_of(later, end), "without": scores_of(later, without)}
         lasting = [k for k, one in enumerate(model.effects) if one.log is None]
         if "without" in confidence_set(scores, later.config) and all(
-            later.possible(without, place=k) for k in lasting
+            possible(later, without, place=k) for k in lasting
         ):
             causes, end, place = [c for k, c in enumerate(causes) if k != place], without, 0
         else:
             place += 1
     return causes, end
-
-
-def _scores(later: Later, state: State, numbers: int = 0) -> Array:
-    """Return the predictive score of each block, with its share of what the model costs.
-
-    A standing number that is far from the prior predicts other blocks as well as a cause does: what
-    the prior says against it is charged, and further numbers as BIC does (Schwarz 1978).
-    """
-    price = state.cost - state.rss + numbers * np.log(later.rows.count)
-    return np.asarray(log_scores(state.losses, later.block_rows) + price / len(later.block_rows))
-
-
-def refit(
-    later: Later, state: State, effect: Effect, amplitudes: Array, laws: bool = True
-) -> Candidate | None:
-    """Return a cause that somebody names, refitted, by the law of it that predicts best."""
-    one = _candidate(later, state, effect, amplitudes)
-    return best_law(later, state, one) if one is not None and laws else one

@@ -15,13 +15,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipelines.diagnosis.candidate_fits import Candidate, best_law, refit
 from pipelines.diagnosis.candidates import Group
 from pipelines.diagnosis.dataset import Rows
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.result import Standing as Told
 from pipelines.diagnosis.score import confidence_set, log_scores
 from pipelines.diagnosis.screening import Screened, best_of
-from pipelines.diagnosis.selection import Candidate, best_law, refit
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.trained import Standing, told
 from pipelines.diagnosis.unnamed import FORM, Key

@@ -184,9 +184,12 @@ class Effect(ABC):
 
     def at_end(self, name: str, by: float) -> bool:
         """Return whether a shape is at the end of its range, and `by` points out of it."""
-        quantity = next(q for q in self.parameters if q.name == name)
-        here = float(getattr(self, name))
-        return (here <= quantity.low and by < 0.0) or (here >= quantity.high and by > 0.0)
+        own = [q for q in self.parameters if q.name == name]  # none: an amplitude, by its number
+        return any(
+            (getattr(self, name) <= q.low and by < 0.0)
+            or (getattr(self, name) >= q.high and by > 0.0)
+            for q in own
+        )
 
     def within(self, name: str, value: float) -> float:
         """Return a number, or the end of the range of parameter `name` that is nearest to it."""
