@@ -18,7 +18,7 @@ from pipelines.effects.base import Effect, Event
 from pipelines.estimation.bootstrap import chi2_bound, upper_point
 from pipelines.estimation.joint_table import Array, Indices, by_joint
 
-__all__ = ["DIRECTIONS", "Window", "push_of", "windows_of"]
+__all__ = ["DIRECTIONS", "Window", "no_push", "push_of", "windows_of"]
 
 _TOUCHED = 0.01  # numerics: of the largest effect of a push, from which a row is touched by it
 DIRECTIONS = 3  # numerics: components of a force
@@ -81,9 +81,14 @@ def push_of(
     window = _standing_out(rows, dictionary, arm, residual, config)
     if window is None or window.free - window.gain < config.relevance * window.free:
         return window, ""
+    return None, no_push(rows, window)
+
+
+def no_push(rows: Rows, window: Window) -> str:
+    """Return in words that something else than a push happened in a window."""
     log = rows.data.logs[window.log - rows.data.first].log.name
     start = getattr(window.effect, "start", 0.0)
-    return None, f"what happened {start:.2f} s into {log} is not what a push on the tip does"
+    return f"what happened {start:.2f} s into {log} is not what a push on the tip does"
 
 
 def _free(rows: Rows, window: Window, residual: Sequence[Array]) -> float:

@@ -22,7 +22,7 @@ from pipelines.diagnosis.candidate_fits import (
     possible,
     scores_of,
 )
-from pipelines.diagnosis.events import Window, push_of
+from pipelines.diagnosis.events import Window, no_push, push_of
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.score import confidence_set, probabilities
 from pipelines.diagnosis.screening import Screened, best_of
@@ -169,6 +169,8 @@ class _Step:
         rows, arm = later.rows, later.dataset.arm
         touch, moment = push_of(rows, later.dictionary, arm, self.state.residual, later.config)
         every = self._refitted(responses, touch)
+        if touch is not None and not any(one.event for one in every):
+            moment = no_push(rows, touch)
         noisy = [one for one in every if one.noisy]
         most = max((one.gain for one in noisy), default=0.0)
         tried = [one for one in every if not (one.noisy or (one.event and one.gain < most))]

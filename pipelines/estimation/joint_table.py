@@ -32,6 +32,7 @@ __all__ = [
     "in_rows",
 ]
 
+_NOTHING = 1e-12  # numerics: of the longest column
 _ROUNDING = 1e-11  # numerics: of a diagonal, by which products of columns may be wrong
 _ROOM, _AT_ONCE = 4_000_000, 64  # numerics: values in double precision, columns
 _DEPENDENT = 1e-6  # numerics: squared length, of columns of unit length, that others leave
@@ -163,8 +164,9 @@ class Table:
 
     @property
     def lengths(self) -> Array:
-        """(k,) `norms` to divide by: 1 of columns of zeros."""
-        return np.where(self.norms > 0.0, self.norms, 1.0)
+        """(k,) `norms` to divide by: 1 of columns that are zero but for rounding."""
+        least = _NOTHING * self.norms.max(initial=0.0)
+        return np.where(self.norms > least, self.norms, 1.0)
 
     def gram(self, other: Table, part: Parts | None = None) -> Array:
         """Return A Bᵀ (k, l), over the rows of `part` (a mask for each joint) where it is given."""
