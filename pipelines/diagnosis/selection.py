@@ -166,11 +166,10 @@ class _Step:
         Where none is selected, the round says why, and there is no state.
         """
         later = self.later
-        rows, arm = later.rows, later.dataset.arm
-        touch, moment = push_of(rows, later.dictionary, arm, self.state.residual, later.config)
+        touch, moment = self._push()
         every = self._refitted(responses, touch)
         if touch is not None and not any(one.event for one in every):
-            moment = no_push(rows, touch)
+            moment = no_push(later.rows, touch)
         noisy = [one for one in every if one.noisy]
         most = max((one.gain for one in noisy), default=0.0)
         tried = [one for one in every if not (one.noisy or (one.event and one.gain < most))]
@@ -193,6 +192,13 @@ class _Step:
             return replace(seen, stopped=stopped), None
         chosen = best_law(later, self.state, pick).state
         return replace(seen, cause=cause, after=chosen.fit), chosen
+
+    def _push(self) -> tuple[Window | None, str]:
+        """Return the push that exceeds all else, and is relevant beside the causes found."""
+        later, left = self.later, self.state.residual
+        touch, moment = push_of(later.rows, later.dictionary, later.dataset.arm, left, later.config)
+        least = later.config.relevance * (self.start.cost - self.state.cost)
+        return (touch if touch is not None and touch.gain >= least else None), moment
 
     def _completed_by_another(self, tried: Sequence[Candidate]) -> Candidate | None:
         """Return the best cause if one more leaves nothing that a shape without a name explains.
@@ -274,9 +280,7 @@ class _Step:
         of what it saves.
         """
         later, state, new = self.later, self.state, one.state
-        if one.event:
-            return one.gain >= later.config.relevance * (self.start.cost - state.cost)
-        if one.key not in self.significant:  # frequency responses name it
+        if one.event or one.key not in self.significant:  # frequency responses name it
             return True
         models = (new.model, new.model.without(len(new.model.effects) - 1))
         both = [later.rows.torque(model) for model in models]
