@@ -18,10 +18,9 @@ from pipelines.diagnosis.score import log_scores, probabilities
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.unnamed import Key
 from pipelines.effects.base import Effect
-from pipelines.effects.friction import Coulomb
 from pipelines.estimation.bootstrap import chi2_bound
 from pipelines.estimation.candidate_columns import first_samples
-from pipelines.estimation.exact_model import Exact, Named
+from pipelines.estimation.exact_model import Named
 from pipelines.estimation.joint_table import Array, Table, by_joint, gains, in_rows
 from pipelines.estimation.rows import END
 
@@ -80,10 +79,7 @@ def candidate(
     belief = later.beside(state.belief, effect)
     model = state.model.with_effect(effect, start, log=log)
     try:
-        others = _plainer(model) if later.dataset.reference is None else ()
-        begun = [later.begun(one, state.theta, belief) for one in (model, *others)]
-        best = min(begun, key=lambda one: one.cost)
-        fitted = later.fit(best.model, best.theta, belief)
+        fitted = later.fit(model, state.theta, belief)
         explained = state.cost - fitted.cost
         can = possible(later, fitted, explained) and bool(np.isfinite(fitted.losses).all())
         noisy = can and follows_noise(later, fitted, explained)
@@ -91,21 +87,6 @@ def candidate(
         return None
     light = replace(fitted)  # without the columns that were computed for it: they take most memory
     return Candidate((effect.name, effect.joint), gain, light, can, noisy)
-
-
-def _plainer(model: Exact) -> tuple[Exact, ...]:
-    """Return the model with the plain sign change at its last effect's joint, if it has another.
-
-    Fitted without the effect, the curve of the sign change has taken some of it.
-    """
-    columns, joint = model.columns, model.effects[-1].effect.joint
-    plain = tuple(
-        law.plain() if law.joint == joint and isinstance(law, Coulomb) else law
-        for law in columns.laws
-    )
-    if plain == tuple(columns.laws):
-        return ()
-    return (replace(model, columns=replace(columns, laws=plain)),)
 
 
 def best_law(later: Later, state: State, chosen: Candidate) -> Candidate:

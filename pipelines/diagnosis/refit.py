@@ -139,11 +139,6 @@ class Later:
             self._read_off(here.model),
         )
 
-    def begun(self, model: Exact, theta: Array, belief: Belief) -> _Point:
-        """Return the model with the numbers of its nominal model and standing ones fitted."""
-        here = self._at(model, theta, belief)
-        return self._better(here, belief, _DAMPING[0], self.rows.coarse, linear=True)[0]
-
     def _at(self, model: Exact, theta: Array, belief: Belief) -> _Point:
         with np.errstate(all="ignore"):  # a step too far may overflow: it is not taken then
             residual = self._residual(model, theta)

@@ -103,10 +103,6 @@ class Coulomb(_Curved, FrictionLaw):
     def forms(self) -> tuple[Self, ...]:
         return self, replace(self, roundness=EFFECTS.roundness)
 
-    def plain(self) -> Self:
-        """Return the law by tanh, whose roundness is not fitted."""
-        return replace(self, roundness=1.0)
-
 
 @dataclass(frozen=True)
 class _Sigmoids(_Curved, FrictionLaw):
