@@ -413,7 +413,12 @@ class _Step:
         if "without" in pays and not pick.event:
             return None, None, fails
         alike = tuple(one.key for one in named if one is not pick)
-        rivals = {shape: v for shape, v in free.items() if pick.key not in apart[shape]}
+        # a shape that predicts better does so within what the law of the cause is inexact
+        rivals = {
+            shape: v
+            for shape, v in free.items()
+            if pick.key not in apart[shape] and v.sum() > scores[pick.key].sum()
+        }
         probable = probabilities(scores | rivals, later.config)
         return pick, Cause(pick.key, alike, probable), ""
 
