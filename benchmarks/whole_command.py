@@ -7,7 +7,7 @@ Goals (performance.md): a ratio of 3.5 at least, 750 ms at most; the report is l
 reads the log with h5py, reconstructs each joint with a filterpy loop, builds Pinocchio's regressor
 sample by sample, low-passes torque and columns alike with scipy and solves with np.linalg.lstsq. It
 prints base parameters, while the command also holds blocks out, gives standard deviations, checks
-links and the balance of power, and writes a model and a derived log.
+links, and writes a model and a derived log.
 
 Two scripts run: with filterpy's observer, and with its RTS smoother, which is what the command does
 by default.

@@ -41,7 +41,7 @@ class Stationary:
     step: Array  # h (joints,)
     poles: Complex  # (joints, order) in z
     gain: Array  # k (joints, order)
-    remainder: Array  # 1 - k_1 (joints,): what is left of an innovation after the update
+    remainder: Array  # 1 - k_1 (joints,): the rest of an innovation after the update
     transition: Array  # E (joints, order, order)
     predictor: Array  # A = E (I - k c): from prediction to prediction
     updater: Array  # I - k c

@@ -161,7 +161,7 @@ class Recipe:
     orders: int = 0  # [1/rev] of a torque that a found cut-off lets through at the fastest speed
     lowest_hz: float = 0.0  # of a cut-off that is found
     highest_hz: float = np.inf
-    found: bool = False  # the cut-off, or that there is none, came of the fitted logs
+    found: bool = False  # whether the fitted logs gave the cut-off, or showed that none is needed
     keep: float = KEEP  # samples left in a period of the cut-off, where no decimation is given
 
 

@@ -160,7 +160,7 @@ def on_grid(y: Array, grid: Grid, sample_time: float, track: Tracker) -> tuple[A
 
 def grid(start: float, end: float, rate: float) -> Array:
     """Return even time stamps [s] from `start` on, `rate` a second, none after `end`."""
-    # a millionth of a step of slack: 10 s at 400 Hz are 4001 samples, whatever the rounding
+    # a millionth of a step of slack: 10 s at 400 Hz are 4001 samples in spite of rounding
     count = int(np.floor((end - start) * rate + 1e-6)) + 1
     return start + np.arange(max(0, count)) / rate
 

@@ -261,7 +261,7 @@ def fit(equations: Iterable[Block], *, weights: Array | None = None) -> Fit:
 
     Args:
         equations: blocks; a list, or an object whose `__iter__` makes them anew.
-        weights: of the channels; their own residuals decide where there are none.
+        weights: of the channels; by default their own residuals decide.
     """
     normal = gather(equations)
     solution = solve(normal, weights=weights)

@@ -73,7 +73,7 @@ def solved(table: Array, y: Array, ridge: float = 0.0) -> Array:
 def superfluous(table: Array, wanted: Sequence[int], least: float) -> list[int]:
     """Return the rows of `table` (k, rows), of those wanted, that the others imitate.
 
-    The one that is seen least goes first, and no longer counts as one of the others: of two columns
+    The least visible one goes first, and no longer counts among the others: of two columns
     that are nearly the same one stays (pivoting, as in Golub & Van Loan 2013, ch. 5.4).
     """
     unit, _ = _unit(table)

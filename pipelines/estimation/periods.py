@@ -282,7 +282,7 @@ def mean_period(
 
 
 def doubts(floor: NoiseFloor | None, where: object) -> list[Check]:
-    """T10: periods that are not averaged, and what is left out of the mean."""
+    """T10: periods that are not averaged, and periods outside the mean."""
     if floor is None or not (floor.unlike or floor.left_out):
         return []
     if floor.unlike:

@@ -297,7 +297,7 @@ class _Rungs:
     def chosen(self, law: Effect) -> int:
         """Return the rung of `law` with fewest terms that is not clearly worse than the best.
 
-        The last is taken whatever is known of it.
+        The last is taken in any case.
         """
         last, row = len(plainer(law)), _row(law)
         able = [rung for rung in range(last) if not self.unclear(law, rung)] + [last]

@@ -353,7 +353,7 @@ def _gap(observer: Observer, count: int) -> tuple[Array, Array]:
 def _forward(observer: Observer, y: Array, mean: Array) -> tuple[list[tuple[_Block, Array]], Array]:
     """Run the stationary filter over `y` (joints, samples) from the prediction `mean`.
 
-    Returns whole blocks and what is left, each (joints, blocks, size + 2 order) with [inputs,
+    Returns whole blocks and the rest, each (joints, blocks, size + 2 order) with [inputs,
     prediction at its start, room for λ], and the prediction after all.
     """
     parts, n, whole = [], observer.order, y.shape[1] // BLOCK * BLOCK

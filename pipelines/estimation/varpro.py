@@ -6,7 +6,7 @@
 For every θ the linear part has a closed solution, so the search is over θ only (variable
 projection: Golub & Pereyra 1973). Its Gauss-Newton step takes Kaufman's Jacobian 1975,
 -P⊥ (∂A/∂θ_i) β, with P⊥ the projection off [Z, A]; Levenberg-Marquardt keeps it from running away.
-Rows are taken as equally good; whatever memory their noise has goes into the covariance.
+Rows are taken as equally good; the memory of their noise goes into the covariance.
 """
 
 from __future__ import annotations

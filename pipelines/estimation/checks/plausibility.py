@@ -8,7 +8,7 @@ friction (`rows`); then other explanations are tried on the same rows: another s
 An alternative is reported only where the log as it is is explained badly **and** the alternative
 explains it well: what is wrong with an arm that nothing explains better is for `diagnose` to say.
 
-Time: τ(t + d) ≈ τ(t) + d τ̇(t). What a joint's row leaves of τ is compared with what it leaves of τ̇
+Time: τ(t + d) ≈ τ(t) + d τ̇(t). The residual of τ in a joint's row is compared with that of τ̇
 (Gauss-Newton), in each quarter of the log and on each joint: their scatter says how sure the answer
 is, their trend is the drift. Friction lags as well after a reversal (Armstrong-Hélouvry, Dupont &
 Canudas de Wit 1994), so an offset is accepted only where the rest of the motion shows it too.
@@ -269,7 +269,7 @@ def _closes(found: Findings) -> bool:
 
 
 def _evidence(subject: Subject) -> Evidence | str:
-    """Return the rows of a log; why there are none; empty for a plan, which has no positions."""
+    """Return the rows of a log, or the reason for their absence; empty for a plan."""
     if not subject.sampled or not subject.good.time.known:
         return ""
     log, good, body = subject.log, subject.good, rigid_body(subject.log.robot)
@@ -308,7 +308,7 @@ def _found(subject: Subject, e: Evidence | str) -> tuple[Check | NotTested, ...]
 
 
 def _against_command(subject: Subject) -> tuple[Check, ...]:
-    """Return what the log's controller says of its torque; nothing where none is described."""
+    """Compare the torque with the command of the log's controller, where one is described."""
     if subject.log.controller is None:
         return ()
     from pipelines.simulation.commanded import against_command
