@@ -12,14 +12,24 @@ import pytest
 import rrrid
 from pipelines import run
 from pipelines.errors import UsageError
+from pipelines.io.files import open_log
 from pipelines.stage import Request, run_stage
+from tests.diagnose.sessions import written
+from tests.healthy import begun
 
 LOGS = Path(__file__).resolve().parents[2] / "sample_logs" / "rrr-closed-form"
 
 
 @pytest.fixture(scope="module")
-def loaded() -> rrrid.Answer:
-    return rrrid.load(LOGS)
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Six seconds of two excitations and a hold."""
+    kept = [open_log(LOGS / f"{name}.h5").log for name in ("excitation-1", "excitation-2", "hold-1")]
+    return written(tmp_path_factory.mktemp("logs") / "logs", [begun(log, 6000) for log in kept])
+
+
+@pytest.fixture(scope="module")
+def loaded(logs: Path) -> rrrid.Answer:
+    return rrrid.load(logs)
 
 
 @pytest.fixture(scope="module")
@@ -39,9 +49,9 @@ def test_import_loads_no_library_and_no_stage():
     assert not there & {"numpy", "scipy", "pandas", "h5py", "matplotlib", "pipelines.stage"}
 
 
-def test_chain_of_functions_gives_what_a_run_gives(model: rrrid.Answer, tmp_path: Path):
+def test_chain_of_functions_gives_what_a_run_gives(model: rrrid.Answer, logs: Path, tmp_path: Path):
     others = ("fit-friction", "validate-writing", "frf", "diagnose", "extend")
-    request = Request((LOGS,), out=tmp_path / "run", no_report=True)
+    request = Request((logs,), out=tmp_path / "run", no_report=True)
     whole = run_stage(run.STAGE, request, run.Settings(skip=others, no_cache=True))
     stored = next(one.result for one in whole.result.stages if one.name == "estimate-bps")
     assert model.result.relative_error == stored.relative_error
