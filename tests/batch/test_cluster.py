@@ -51,7 +51,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
         yield Cluster(tmp_path_factory.mktemp("cluster"), stack)
 
 
-ITEMS = {f"{i:02d}": f"value {i} std 0.1" for i in range(3)}
+ITEMS = {f"{i:02d}": f"value {i} std 0.1" for i in range(1)}
 
 
 @pytest.mark.row("P12", "P04")
