@@ -15,6 +15,7 @@ from pipelines.frequency.modes import Modes, Pair
 from pipelines.frequency.rational import Known, Mode, Rational
 from pipelines.frequency.spectra import FrequencyResponse
 from pipelines.io.log import Array
+from tests.seeds import seeds
 
 _EMPTY = FrequencyResponse(np.zeros(0), np.zeros(0, complex), np.zeros(0), np.zeros(0), 1.0, 1.0, 1.0)
 _NONE = Rational(np.zeros(2), np.zeros((2, 2)), 0, 0, 1.0, (4.0, 250.0), 1.0, 0.0)
@@ -62,7 +63,7 @@ def test_frequencies_are_those_of_the_masses() -> None:
         np.testing.assert_allclose(own, truth, rtol=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", seeds(40, usual=10))
 def test_neither_is_taken_for_the_other(seed: int) -> None:
     """Random bases and joints in two postures, frequencies off by 0.3 %: named rightly or left open, never the other."""
     rng = np.random.default_rng([8, seed])
@@ -112,9 +113,9 @@ def test_a_base_under_a_geared_arm_is_a_base() -> None:
 
 
 def test_numbers_vary_as_their_deviations_say() -> None:
-    """A spring's stiffness and motor inertia from 100 draws of noisy frequencies."""
+    """A spring's stiffness and motor inertia from 40 draws of noisy frequencies."""
     rng, inertia, found = np.random.default_rng(5), (1.1, 1.4), []
-    for _ in range(100):
+    for _ in range(40):
         pairs = [tuple(f * rng.normal(1.0, 4e-3) for f in two_masses(0.3, j - 0.3, 15000.0)) for j in inertia]
         ((one,), _) = group_joint(1, [modes_of([(a, r)], j, std=4e-3) for (a, r), j in zip(pairs, inertia, strict=True)], 1e-3)
         found.append([(known.value, known.std) for known in (one.parameters["stiffness"], one.parameters["motor_inertia"])])
