@@ -37,6 +37,7 @@ class FrictionConfig:
     # choice of the law
     sure: float = 2.0  # standard errors of a difference, beyond which it is one: two-sided .05
     worth: float = 0.01  # of the mean square: a smaller difference does not count, .5 % rms
+    more: float = 0.1  # of the residual (mean square), that a law of several causes explains more
     blocks: int = 20  # of the rows that judge, whose sums give a deviation: known to a sixth
     folds: int = 10  # of the rows, each held out in turn (Kohavi 1995, IJCAI, p. 1137)
     points: int = 60  # speeds, each way, at which curves are compared

@@ -174,7 +174,7 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None) -> JointFi
         (law,) if law is not None else tuple(one for one in LADDER if one.pointwise or not sticks)
     )
     judging = Equations(validate, joint) if validate else None
-    ladder = climb(Equations(identify, joint), judging, laws)
+    ladder = climb(Equations(identify, joint), judging, laws, fit.theta)
     both, chosen = (*identify, *validate), ladder.chosen.fit
     if not sticks:  # reversals are kinks of the speed, and where it sticks they are left out
         both = tuple(refined(stretch, chosen, resolution) for stretch in both)

@@ -12,7 +12,7 @@ an offset apart from friction that is larger one way.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -83,20 +83,32 @@ class Ladder:
         return tuple(found)
 
 
-def climb(identify: Equations, validate: Equations | None, laws: Sequence[Law] = LADDER) -> Ladder:
-    """Try `laws`.
+def climb(
+    identify: Equations,
+    validate: Equations | None,
+    laws: Sequence[Law] = LADDER,
+    flexible: Array | None = None,
+) -> Ladder:
+    """Try `laws`; the last one of the ladder must explain a tenth more than the best before it.
 
     Args:
         identify: rows that laws are fitted to.
         validate: rows that judge them; None: blocks of the same rows, held out in turn.
+        flexible: θ that the last law of the ladder starts from.
     """
     tried: list[CandidateFit] = []
     sharpness: float | None = None
     for law in laws:
-        fit = fit_law(identify, law, None, sharpness)
+        starts = [flexible] if law is LADDER[-1] and flexible is not None else None
+        fit = fit_law(identify, law, starts, sharpness)
         residual = _held_out(fit) if validate is None else validate.residual(fit)
-        takes = takes_power(identify, law, fit.joint, fit.found)
-        tried.append(CandidateFit(fit, residual, _fault(fit, takes)))
+        reason = _fault(fit, takes_power(identify, law, fit.joint, fit.found))
+        one = CandidateFit(fit, residual, reason)
+        if law is LADDER[-1] and (able := [x for x in tried if not x.reason]):
+            best = min(able, key=lambda x: x.validate_rms)
+            if one.validate_rms**2 >= (1.0 - FRICTION.more) * best.validate_rms**2:
+                one = replace(one, reason=f"explains too little beside {best.law.name}")
+        tried.append(one)
         if law.name == "coulomb+viscous":
             sharpness = float(np.exp(fit.theta[0]))
     possible = [one for one in tried if not one.reason] or tried
