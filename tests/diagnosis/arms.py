@@ -13,7 +13,7 @@ import numpy as np
 from pipelines.dynamics.body import Motion
 from pipelines.io.log import Array, ExperimentLog
 from sample_logs.make_closed_form import NOISE, quantised, torque_step
-from tests.model.estimation.experiments import arm, experiment, motion_of
+from tests.estimation.experiments import arm, experiment, motion_of
 
 SECONDS = 8.0
 

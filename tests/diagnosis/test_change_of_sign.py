@@ -12,8 +12,8 @@ from pipelines.io.log import Array, ExperimentLog
 from tests.diagnose.sessions import but
 from tests.diagnosis.arms import hidden
 from tests.diagnosis.asking import causes, diagnosed, effects
+from tests.estimation.experiments import COULOMB
 from tests.healthy import begun
-from tests.model.estimation.experiments import COULOMB
 
 FEW = ("stribeck", "concave_friction")
 

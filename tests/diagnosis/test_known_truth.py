@@ -14,8 +14,8 @@ from tests.diagnose.sessions import but
 from tests.diagnosis.arms import arm, hidden, wave
 from tests.diagnosis.asking import answered, causes, diagnosed, effects
 from tests.diagnosis.rotor import turned
+from tests.estimation.experiments import VISCOUS
 from tests.healthy import begun, with_signal
-from tests.model.estimation.experiments import VISCOUS
 
 Load = Callable[[Motion], Array]  # torque (samples, joints) [N m] that a motion costs beside
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pipelines.io.log import ExperimentLog
-from tests.model.estimation.experiments import experiment
+from tests.estimation.experiments import experiment
 
 
 @pytest.fixture(scope="module")

@@ -22,10 +22,10 @@ from pipelines.quality.checks import check_log
 from pipelines.stage import Inputs
 from tests.cli.commands import rrrid
 from tests.estimate_bps.estimates import SYMMETRIC, Settings, stage
+from tests.estimation.experiments import truth
 from tests.fault_table import FAULTS
 from tests.faulty import dropped, spiky
 from tests.healthy import changed, good_log, with_signal
-from tests.model.estimation.experiments import truth
 from tests.seeds import rarely
 
 

@@ -16,8 +16,8 @@ from pipelines.io.log import ExperimentLog
 from pipelines.io.model_file import read_model
 from pipelines.stage import Request, run_stage
 from tests.estimate_bps.estimates import SYMMETRIC, contents, of_elbow, stage
+from tests.estimation.experiments import experiment, truth
 from tests.healthy import begun, with_signal
-from tests.model.estimation.experiments import experiment, truth
 
 
 def test_derived_logs_give_what_recordings_give(good: ExperimentLog, held_out: ExperimentLog, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from pipelines.io.robot import format_robot
 from pipelines.report.bps_report import bps_report
 from tests.cli.commands import rrrid
 from tests.estimate_bps.estimates import SYMMETRIC, of_elbow, stage
-from tests.model.estimation.experiments import arm, experiment, truth
+from tests.estimation.experiments import arm, experiment, truth
 
 
 def test_slow_samples_of_one_joint_leave_the_others_alone(good: ExperimentLog, tmp_path: Path) -> None:

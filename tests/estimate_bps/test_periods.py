@@ -17,8 +17,8 @@ from pipelines.report.bps_report import bps_report
 from pipelines.stage import Inputs
 from sample_logs.make_closed_form import NOISE, torque_step
 from tests.estimate_bps.estimates import SYMMETRIC
+from tests.estimation.experiments import arm, experiment, periodic, truth
 from tests.healthy import with_signal
-from tests.model.estimation.experiments import arm, experiment, periodic, truth
 from tests.seeds import rarely
 
 ENCODER = 1e-5

@@ -15,7 +15,7 @@ from pipelines.estimation.least_squares import (
     triangulate,
 )
 from pipelines.io.log import Array
-from tests.fit.problems import CHANNELS, SIGMA, WIDTH, Problem, problem, white
+from tests.estimation.problems import CHANNELS, SIGMA, WIDTH, Problem, problem, white
 
 METHODS = [gather, triangulate]
 

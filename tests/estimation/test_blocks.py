@@ -11,7 +11,7 @@ from scipy import signal
 
 from pipelines.estimation.least_squares import Block, by_blocks
 from pipelines.io.log import Array
-from tests.fit.problems import CHANNELS, Problem, problem, white
+from tests.estimation.problems import CHANNELS, Problem, problem, white
 from tests.seeds import rarely
 
 SAMPLES, BLOCKS, GUARD = 1500, 10, 7

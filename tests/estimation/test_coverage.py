@@ -9,7 +9,7 @@ from pipelines.estimation.estimate import Recipe, fit_logs, motions_of
 from pipelines.estimation.motion import Reconstruction
 from pipelines.estimation.nominal import nominal_columns
 from pipelines.io.log import Array
-from tests.model.estimation.experiments import arm, experiment, truth
+from tests.estimation.experiments import arm, experiment, truth
 
 pytestmark = pytest.mark.slow
 SEEDS = range(100)

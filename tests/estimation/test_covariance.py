@@ -10,7 +10,7 @@ import pytest
 from pipelines.estimation.covariance import robust_covariance
 from pipelines.estimation.least_squares import fit, gather, solve
 from pipelines.io.log import Array
-from tests.fit.problems import (
+from tests.estimation.problems import (
     CHANNELS,
     SIGMA,
     Problem,

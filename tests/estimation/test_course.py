@@ -7,8 +7,8 @@ from scipy import signal
 
 from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.estimation.result import course, torques
+from tests.estimation.experiments import arm, experiment
 from tests.healthy import with_signal
-from tests.model.estimation.experiments import arm, experiment
 
 
 def test_what_is_drawn_is_what_a_low_pass_leaves() -> None:

@@ -8,8 +8,8 @@ import pytest
 from pipelines.estimation.motion import Reconstruction, reconstruct
 from pipelines.estimation.periods import Periods, doubts, mean_period
 from pipelines.io.log import Array, ExperimentLog
+from tests.estimation.experiments import motion_of, one_period, periodic
 from tests.healthy import with_signal
-from tests.model.estimation.experiments import motion_of, one_period, periodic
 from tests.seeds import rarely
 
 

@@ -8,7 +8,7 @@ import pytest
 from pipelines.errors import InputRejected
 from pipelines.estimation.grids import grids, lay_on, on_grid
 from pipelines.estimation.state_estimation import design, smooth
-from tests.signal.chains import swing
+from tests.estimation.chains import swing
 
 T = 1e-3
 

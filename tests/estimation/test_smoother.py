@@ -10,8 +10,8 @@ from benchmarks.textbook_kalman import Textbook
 from pipelines.errors import InputRejected
 from pipelines.estimation.motion import twicing_growth
 from pipelines.estimation.state_estimation import Start, design, observe, smooth
+from tests.estimation.chains import assert_near, exact_smoother, swing, walk, with_gaps
 from tests.seeds import rarely
-from tests.signal.chains import assert_near, exact_smoother, swing, walk, with_gaps
 
 T, STEP = 1e-3, 1e-5
 R = STEP**2 / 12

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.textbook_kalman import Textbook
-from tests.signal.chains import exact_smoother, swing
+from tests.estimation.chains import exact_smoother, swing
 
 
 def test_one_measurement_is_a_weighted_mean() -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pipelines.estimation.motion import Reconstruction, reconstruct
+from tests.estimation.experiments import motion_of
 from tests.healthy import ENCODER, good_log, make_log, rest, with_signal
-from tests.model.estimation.experiments import motion_of
 
 
 @pytest.mark.parametrize(("order", "expected"), [(3, 1.0 / 12.0), (4, 0.0)])

@@ -12,8 +12,8 @@ from benchmarks.textbook_kalman import Textbook
 from pipelines.errors import InputRejected, UsageError
 from pipelines.estimation.chain import held_input, lyapunov, stationary, transition
 from pipelines.estimation.state_estimation import Start, design, observe
+from tests.estimation.chains import assert_near, exact_smoother, swing, with_gaps
 from tests.seeds import rarely
-from tests.signal.chains import assert_near, exact_smoother, swing, with_gaps
 
 T, STEP = 1e-3, 1e-5
 R = STEP**2 / 12

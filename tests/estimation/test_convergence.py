@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.estimation.least_squares import convergence, fit
-from tests.fit.problems import problem, white
+from tests.estimation.problems import problem, white
 
 
 def test_series_is_the_fit_of_the_first_samples() -> None:

@@ -14,7 +14,7 @@ from pipelines.estimation.identifiability import (
 )
 from pipelines.estimation.least_squares import Block, Solution, fit, gather, triangulate
 from pipelines.io.log import Array
-from tests.fit.problems import WIDTH, problem, white
+from tests.estimation.problems import WIDTH, problem, white
 
 NAMES = [f"b{k}" for k in range(WIDTH)]
 

@@ -32,7 +32,7 @@ from pipelines.io.log import Array
 from sample_logs.make_model import synthetic_arm
 from tests.diagnosis.arms import hidden, wave
 from tests.diagnosis.asking import extended
-from tests.model.estimation.experiments import COULOMB, VISCOUS
+from tests.estimation.experiments import COULOMB, VISCOUS
 
 SETTINGS = Recipe()
 JOINTS = (1, 2, 3)

@@ -15,8 +15,8 @@ from pipelines.estimation.tuning import (
     tune,
     whiteness,
 )
+from tests.estimation.chains import walk
 from tests.seeds import seeds
-from tests.signal.chains import walk
 
 T = 1e-3
 
