@@ -22,13 +22,15 @@ AMPLE = 24.0  # numerics: samples a period of the cut-off at which columns are c
 COARSE = 12.0  # numerics: those of a search: a change of sign then shows in hundredths of the noise
 KEEP = 4.0  # numerics: samples left per period of the cut-off: 2 × 6 dB per octave at Nyquist
 PAD = 4.0  # numerics: periods of the cut-off by which a stretch is continued at either end
+# numerics: samples, and periods of the cut-off, in which the low-pass forgets all but 1e-12
+_FORGOTTEN = (160, 12.0)
 _PARTS = 4  # numerics: steps shorter than so many samples may be fractions, denominators up to it
 
 
 def zero_phase(x: Array, cutoff_hz: float, rate: float) -> Array:
     """Filter along axis 0 forward and backward by Butterworth's low-pass of order 4.
 
-    In the frequency domain, the ends continued by odd extensions of four periods.
+    In the frequency domain, the ends continued by odd extensions in which it forgets the ends.
 
     Raises:
         InputRejected: T08, fewer than two samples; D01, missing ones.
@@ -38,7 +40,7 @@ def zero_phase(x: Array, cutoff_hz: float, rate: float) -> Array:
     if not np.isfinite(x.sum()):
         remedy = "cut the log at its gaps, or reconstruct the missing samples first"
         raise InputRejected("D01", "missing samples in a signal that is filtered", remedy=remedy)
-    pad = min(len(x) - 1, ceil(PAD * rate / cutoff_hz))
+    pad = min(len(x) - 1, max(_FORGOTTEN[0], ceil(_FORGOTTEN[1] * rate / cutoff_hz)))
     before, behind = 2.0 * x[0] - x[pad:0:-1], 2.0 * x[-1] - x[-2 : -pad - 2 : -1]
     wide = np.concatenate([before, x, behind])
     middle, size = 0.5 * (wide[0] + wide[-1]), fast_length(len(wide))
