@@ -22,8 +22,7 @@ AMPLE = 24.0  # numerics: samples a period of the cut-off at which columns are c
 COARSE = 12.0  # numerics: those of a search: a change of sign then shows in hundredths of the noise
 KEEP = 4.0  # numerics: samples left per period of the cut-off: 2 × 6 dB per octave at Nyquist
 PAD = 4.0  # numerics: periods of the cut-off by which a stretch is continued at either end
-# numerics: samples, and periods of the cut-off, in which the low-pass forgets all but 1e-12
-_FORGOTTEN = (160, 12.0)
+_FORGOTTEN = 160, 12.0  # numerics: samples, and periods, in which the low-pass forgets an end
 _PARTS = 4  # numerics: steps shorter than so many samples may be fractions, denominators up to it
 
 
