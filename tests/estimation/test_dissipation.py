@@ -31,7 +31,7 @@ def test_no_fit_has_friction_that_drives() -> None:
     low = np.full(len(done.slopes), -np.inf)
     low[1:len(beta)] = -beta[1:] - 1e-12
     again = lsq_linear((done.slopes * done.weights).T, done.residual, (low, np.full(len(low), np.inf)))
-    assert 2.0 * again.cost > 0.999 * done.rss
+    assert 2.0 * again.cost > 0.999 * (done.residual @ done.residual)
 
 
 def test_what_dissipates_is_as_it_was() -> None:
