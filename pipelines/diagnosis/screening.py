@@ -56,7 +56,7 @@ def screen(
         found = Screened(group, gain, int(seen.sum()), amplitudes)
         if group.amplitude is not None:
             found = _at_amplitude(found, group.amplitude)
-        elif group.sign * found.amplitudes[0] < 0.0:  # the best that it can have is none
+        elif group.sign * found.amplitudes[0] < 0.0:  # zero is its best amplitude
             found = replace(found, gain=0.0)
         out.append(found)
     return out

@@ -4,7 +4,7 @@
     trained.models                         nominal, with the first cause, …, with all of them
     trained.held_out(0)                    residual of the nominal model on held-out rows
     parameters(fit, place)                 the numbers of a cause, with their standard deviations
-    told(acting)                           the reported parameters of an effect
+    told(effect)                           its reported parameters
 
 A model for simulation has no standing dictionary, but in its place causes that the reference logs
 show. The prior is that of its nominal numbers alone,

@@ -75,7 +75,7 @@ _BEYOND = 0.1  # numerics: share of the range in which it was seen; farther out 
 
 
 class _FromTable:
-    """What the table of causes has of an effect by its name."""
+    """A field that the table of causes holds for an effect by its name."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.field = name

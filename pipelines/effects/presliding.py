@@ -20,7 +20,7 @@ __all__ = ["Presliding"]
 
 _ONE = 1e-6  # numerics: from an exponent of 1, within which it is 1
 _SLIDES = 1e-12  # numerics: of the largest bending
-_LEAST = 0.05  # numerics: exponent of elements: below, all slip as one
+_LEAST = 0.05  # numerics: exponent of elements: below, all slip at once
 _ELEMENTS = 12  # numerics: that slip one after the other
 _FAST = 20.0  # numerics: times the speed over which a breakaway falls: nothing of it is left
 
@@ -92,7 +92,7 @@ class Presliding(Effect):
         return {name: x for name, x in said.items() if breaks or not name.startswith("breakaway")}
 
     def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
-        """Return what is left of it at constant speed: Coulomb friction, and its breakaway."""
+        """Return its torque at constant speed: Coulomb friction, and its breakaway."""
         shaped = self.at(values)
         level = _sliding_level(dq, shaped.breakaway, shaped.breakaway_speed, ARRAYS)
         return np.asarray(values["amplitude"] * np.sign(dq) * level)

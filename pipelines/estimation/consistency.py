@@ -191,7 +191,7 @@ def _central_path(a: Array, b: Array, prior: Array, free: int | None = None) -> 
 
 
 def closest(a: Array, b: Array, prior: Array) -> Array | None:
-    """Return φ with a φ = b at the least divergence from J0; None where there is none.
+    """Return φ with a φ = b at the least divergence from J0, or None without a solution.
 
     Where there are such φ, there are some on all of the line from a φ0 to b. Newton's method goes
     along it: most of the way to where a body ceases to exist, then back to the least divergence at

@@ -185,7 +185,7 @@ class Exact:
 
     @property
     def core(self) -> int:
-        """Count the first effects, up to the last that does more than add its torque."""
+        """Count the effects before, and with, the last one that does more than add its torque."""
         if self.misread:
             return len(self.effects)
         places = (k + 1 for k, one in enumerate(self.effects) if not adds(one.effect))

@@ -1,7 +1,7 @@
 """Filter signals: zero-phase low-pass, averages of a held command, local polynomials, spectra.
 
-The same filter goes over a measured torque and over every column that explains it, so whatever it
-does to one it does to the other, and the parameters between them do not feel it. SciPy's filters
+The same filter goes over a measured torque and over every column that explains it, so it
+changes both alike, and the parameters between them do not feel it. SciPy's filters
 are the reference of the tests; importing them takes longer than a fit.
 """
 

@@ -305,7 +305,7 @@ def several_rows(data: Data, shapes: Sequence[Effect], arm: ArmModel) -> list[Ar
 def fit_nominal(data: Data, columns: Columns) -> tuple[Columns, Fit]:
     """Return the nominal model with the shapes of its laws found, and its fit.
 
-    The last columns of the fit are the slopes of its torque by those shapes: whatever is orthogonal
+    The last columns of the fit are the slopes of its torque by those shapes: a torque orthogonal
     to the fit cannot be imitated by moving them a little, and a law a hundredth too blunt would
     look like a second one at low speed. Shapes by Gauss-Newton, Golub & Pereyra 2003: each step
     solves for shapes and amplitudes together.

@@ -239,7 +239,7 @@ def mean_period(
 ) -> tuple[NoiseFloor | None, MeanLog | None]:
     """Return the scatter between the periods of `log`, and its mean period as a log with a motion.
 
-    The first is None where it has no period, or fewer than two are whole; the second where its
+    Without a period, or with fewer than two whole ones, the first is None; the second where its
     periods cannot be averaged.
 
     Args:

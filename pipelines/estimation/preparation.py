@@ -4,7 +4,7 @@
     prepared.data, prepared.judge, prepared.reference, prepared.columns
     prepared = with_terms_told_apart(prepared, blocks)
 
-Dry friction at rest bears whatever torque a controller commands: such rows do not count where no
+Dry friction at rest bears any torque that a controller commands: such rows do not count where no
 controller is known. Where a joint with dry friction F turns round, its acceleration jumps by 2 F/D;
 a smoother spreads this over its own time, and friction is predicted early or late. What passes the
 smoother above the cut-off of the rows, their low-pass takes away: a smoother that reaches it is

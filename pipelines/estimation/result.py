@@ -27,7 +27,7 @@ _POINTS = 6000  # numerics: of a figure
 
 @dataclass(frozen=True)
 class Estimated:
-    """One parameter. `value` is None where the logs do not determine it."""
+    """One parameter. It has no `value` where the logs do not determine it."""
 
     name: str
     value: float | None

@@ -325,7 +325,7 @@ def _encoder_scale(e: Evidence) -> list[Check]:
 
     First with one set of rigid parameters for all rows, where the scale of a joint tells that bends
     nothing and moves little. Then with parameters of its own for each row, where a joint's angle
-    bends the arm: that holds whatever the torques' scales.
+    bends the arm: that holds for all scales of the torques.
     """
     found = _scaled(e, e.together, _CONFIG.shared_bad) or _scaled(e, e.alone, _CONFIG.scale_bad)
     if found is None or found[2] in e.far:  # what the described links show of a torque
@@ -349,7 +349,7 @@ def _scaled(
 ) -> tuple[float, float, int | None, str] | None:
     """Return what the log leaves, what the best scale leaves, the joint and the factor.
 
-    The joint is None for all that turn. None where the log leaves no more than `bad` or not far
+    The joint is None for all that turn. Return None where the log leaves at most `bad`, or little
     more than that. By the right scale no row fits worse with its own parameters: a joint that hears
     of another drive may fit far better with an angle scaled down, but the other joints' rows, which
     are correct, do not.
