@@ -59,9 +59,9 @@ def check(seed: int, joint: int, duration: float = 20.0) -> float:
     found = fitted(seed, joint, duration)
     numbers, std = np.array([found.joint.fit.inertia, *found.joint.fit.gravity]), found.joint.fit.std[:3]
     apart, weight = np.abs(numbers - found.numbers), float(np.hypot(*found.numbers[1:]))
-    assert np.all(apart <= 3.0 * std), apart / std
+    assert np.all(apart <= 3.0 * std + 1e-9), (apart, std)  # the first joint stands upright: no weight, to rounding
     assert apart[0] <= 0.01 * found.numbers[0]
-    if weight > 1e-9:  # the first joint stands upright
+    if weight > 1e-9:
         assert np.all(apart[1:] <= 0.01 * weight)
     driven = found.joint.driven
     assert driven.error(driven.with_friction) <= 0.05 * driven.error(driven.without)
