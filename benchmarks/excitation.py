@@ -60,7 +60,6 @@ from pipelines.io.robot_files import load_robot
 from pipelines.io.urdf import import_urdf
 from pipelines.simulation.fourier_series import FourierSeries
 from pipelines.stage import Request, run_stage
-from tests.excitation.test_gradient import SHARP, TASKS, WEIGHT, _complex_value, _problem
 
 TX40 = Path(__file__).resolve().parents[2] / "shared" / "real" / "tx40" / "tx40.urdf"
 PAPER = (
@@ -217,18 +216,6 @@ def limits(seeds: int) -> None:
 
 
 def gradient() -> None:
-    worst = 0.0
-    for make in TASKS.values():
-        task = make()
-        problem, rng = _problem(task), np.random.default_rng(1)
-        x = problem.start(rng)
-        _, g, _ = problem.value(x, SHARP, WEIGHT)
-        d = problem.space.project(rng.normal(size=x.shape)) - problem.space.project(
-            np.zeros_like(x)
-        )
-        exact = _complex_value(task, problem, x + 1e-30j * d).imag / 1e-30
-        worst = max(worst, abs(float(g @ d) - exact) / float(np.linalg.norm(g) * np.linalg.norm(d)))
-    row("gradient against the complex step, six problems", worst, 1e-8, "")
     robot = load_robot("rrr")
     fine = landscape(
         plan_task(robot, None, Wishes("condition", symmetric=True, rest=False, speed_share=1.0))
