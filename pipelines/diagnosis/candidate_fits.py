@@ -33,6 +33,7 @@ __all__ = [
     "laws_of",
     "possible",
     "refit",
+    "reformed",
     "scores_of",
 ]
 
@@ -123,6 +124,24 @@ def laws_of(later: Later, end: State, place: int) -> list[tuple[Named, float]]:
             weight = probabilities({k: c.scores(later) for k, c in enumerate(good)}, later.config)
             return [(c.state.model.effects[-1], weight[k]) for k, c in enumerate(good)]
     return [(one, 1.0)]
+
+
+def reformed(later: Later, state: State) -> tuple[Sequence[int], State]:
+    """Return each cause by the law of it that predicts best now, and which causes are kept.
+
+    A cause whose numbers are impossible beside causes found after it is dropped.
+    """
+    kept = list[int]()
+    for place in range(len(state.model.effects)):
+        one, rest = state.model.effects[0], state.model.without(0)
+        before = later.fit(rest, state.theta, later.belief_of(rest))
+        same = candidate(later, before, one.effect, np.array(one.amplitudes), log=one.log)
+        if same is None or not same.possible:
+            state = before
+        else:
+            kept.append(place)
+            state = best_law(later, before, same).state  # the effect is the last one now
+    return kept, state
 
 
 def refit(

@@ -20,6 +20,7 @@ from pipelines.diagnosis.candidate_fits import (
     candidate,
     laws,
     possible,
+    reformed,
     scores_of,
 )
 from pipelines.diagnosis.events import Window, no_push, push_of
@@ -34,7 +35,6 @@ from pipelines.estimation.exact_model import Exact
 from pipelines.estimation.joint_table import Array
 
 __all__ = ["Cause", "Round", "SearchStart", "Selection", "select"]
-
 
 _TURNS = 2  # numerics: groups of promising causes that are refitted until one is a cause
 
@@ -127,7 +127,7 @@ def select(
         kept: Sequence[int] = range(len(before.causes))
         state = later.start(before.model)
         if not before.settled:
-            kept, state = _reformed(later, state)
+            kept, state = reformed(later, state)
         causes = [before.causes[k] for k in kept]
         rounds = [one for one in before.rounds if one.cause in causes]
     cut = tuple[Key, ...]()
@@ -180,18 +180,26 @@ class _Step:
         seen = Round(self.state.fit, significant, fits, moment=moment, doubt=doubt)
         if not tried:
             return replace(seen, follows=in_words(next(iter(others))) if others else ""), None
+        pick, cause, stopped = self._winner(tried, others)
+        if pick is None:
+            return replace(seen, stopped=stopped), None
+        chosen = best_law(later, self.state, pick).state
+        return replace(seen, cause=cause, after=chosen.fit), chosen
+
+    def _winner(
+        self, tried: Sequence[Candidate], others: Mapping[Key, State]
+    ) -> tuple[Candidate | None, Cause | None, str]:
+        """Return the cause that wins by its first law, by another one, or beside one more cause."""
+        later = self.later
         apart = {shape: self._apart(other) for shape, other in others.items()}
         pick, cause, stopped = self._contest(tried, others, apart)
-        if pick is None:  # perhaps by another law of the same cause
+        if pick is None:
             tried = [best_law(later, self.state, one) for one in tried]
             pick, cause, stopped = self._contest(tried, others, apart)
         if pick is None and (two := self._completed_by_another(tried)) is not None:
             scores = {one.key: one.scores(later) for one in tried}
             pick, cause = two, Cause(two.key, (), probabilities(scores, later.config))
-        if pick is None:
-            return replace(seen, stopped=stopped), None
-        chosen = best_law(later, self.state, pick).state
-        return replace(seen, cause=cause, after=chosen.fit), chosen
+        return pick, cause, stopped
 
     def _push(self) -> tuple[Window | None, str]:
         """Return the push that exceeds all else, and is relevant beside the causes found."""
@@ -468,24 +476,6 @@ class _Step:
         free = max(saved(one, one.effects.width - width) for one in others.values())
         exact = 1.0 - self.later.config.relevance
         return [best] if 0.0 < saved(best.state, best.numbers) > exact * free else []
-
-
-def _reformed(later: Later, state: State) -> tuple[Sequence[int], State]:
-    """Return each cause by the law of it that predicts best now, and which causes are kept.
-
-    A cause whose numbers are impossible beside causes found after it is dropped.
-    """
-    kept = list[int]()
-    for place in range(len(state.model.effects)):
-        one, rest = state.model.effects[0], state.model.without(0)
-        before = later.fit(rest, state.theta, later.belief_of(rest))
-        same = candidate(later, before, one.effect, np.array(one.amplitudes), log=one.log)
-        if same is None or not same.possible:
-            state = before
-        else:
-            kept.append(place)
-            state = best_law(later, before, same).state  # the effect is the last one now
-    return kept, state
 
 
 def _backward(later: Later, causes: list[Cause], end: State) -> tuple[list[Cause], State]:

@@ -36,7 +36,7 @@ _SIGNALS = ("q_hat", "dq_hat", "ddq_hat")
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """How motion is reconstructed. A field that is None is found from the data, joint by joint.
+    """How motion is reconstructed. Fields without a value are found from the data, joint by joint.
 
     The paper's chain has order 3: a jerk held over each sample. Of a smooth motion its acceleration
     comes out too large by (ωT)²/12, which over 100 simulated experiments biases a parameter by 0.5

@@ -239,8 +239,8 @@ def mean_period(
 ) -> tuple[NoiseFloor | None, MeanLog | None]:
     """Return the scatter between the periods of `log`, and its mean period as a log with a motion.
 
-    Without a period, or with fewer than two whole ones, the first is None; the second where its
-    periods cannot be averaged.
+    A log with fewer than two whole periods has no scatter, one whose periods cannot be averaged
+    no mean.
 
     Args:
         cutoff_hz: of the zero-phase low-pass over equations; None: none.

@@ -29,7 +29,7 @@ _TABLE: dict[str, Any] = {"compression": "zstd", "write_page_checksum": True}
 
 
 def write(path: Path, parts: Answer) -> None:
-    """Write the parts of a log as one table: zstd, byte-stream-split, page checksums."""
+    """Write the parts of a log to a single table: zstd, byte-stream-split, page checksums."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

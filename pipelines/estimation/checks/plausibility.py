@@ -349,7 +349,7 @@ def _scaled(
 ) -> tuple[float, float, int | None, str] | None:
     """Return what the log leaves, what the best scale leaves, the joint and the factor.
 
-    The joint is None for all that turn. Return None where the log leaves at most `bad`, or little
+    Joint None stands for all that turn. Return None where the log leaves at most `bad`, or little
     more than that. By the right scale no row fits worse with its own parameters: a joint that hears
     of another drive may fit far better with an angle scaled down, but the other joints' rows, which
     are correct, do not.
